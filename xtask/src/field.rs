@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_field_is_the_one_beside_the_scenes_and_has_625_shapes_in_both_languages() {
+    fn the_field_has_625_shapes_in_both_languages() {
         let kept = std::fs::read_to_string(xtask::command::root().join("scenes/field/field.pbrt")).unwrap();
         assert!(scene() == kept, "scenes/field/field.pbrt is another field");
         assert_eq!(pov_scene().matches(" pigment ").count() - 1, 625);

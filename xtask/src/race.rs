@@ -370,7 +370,7 @@ mod tests {
     }
 
     #[test]
-    fn the_town_has_ten_thousand_lamps_and_the_mountains_a_million_triangles() {
+    fn race_scenes_have_their_lamps_and_triangles() {
         let scenes = scenes::all();
         let scene = |name| scenes.iter().find(|s| s.name == name).unwrap();
         let lamps = scene("lights").objects.iter().filter(|o| o.emission.is_some());

@@ -62,7 +62,7 @@ impl Defaults {
     pub fn denoises(&self) -> bool {
         let is_staged = match self.staged.light {
             StageLight::Studio => true,
-            StageLight::Map => self.staged.framed,
+            StageLight::Given => self.staged.framed,
             _ => false,
         };
         is_staged && self.is_of_light

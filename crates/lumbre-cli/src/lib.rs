@@ -183,7 +183,7 @@ pub fn run(words: Vec<OsString>) -> u8 {
     threads::start();
     let outcome = match arguments.command {
         Command::Render(mut arguments) => {
-            arguments.tell_reader();
+            arguments.pass_options_to_reader();
             render::run(&arguments)
         }
         Command::View(arguments) => viewing::run(*arguments),

@@ -223,7 +223,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_does_not_fit_is_refused_with_the_prediction_and_the_option() {
+    fn too_large_pictures_are_refused_with_a_prediction() {
         let memory = Memory { most: 1000, bound: Bound::Flag };
         assert!(memory.check("the picture", 700, 300).is_ok());
         let message = memory.check("the picture", 701, 300).unwrap_err().to_string();
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_of_the_system_is_named_where_it_is_the_cause_and_nowhere_else() {
+    fn the_system_limit_is_named_only_if_it_is_the_cause() {
         let explained = |memory: Memory, kind: LimitKind| {
             let limit = lumbre::formats::LimitError { what: "a.ply".to_owned(), kind, needed: 9, limit: 5 };
             memory.explain(lumbre::Error::Format(limit.into())).to_string()

@@ -35,7 +35,7 @@ pub(crate) trait PictureViewer: Sync {
 }
 
 /// Progress on standard error, and to those who watch for signals.
-pub(crate) struct Watched<'a> {
+pub(crate) struct ProgressReporter<'a> {
     /// What is shown.
     pub display: Display,
     /// Who watches.
@@ -89,7 +89,7 @@ impl Series {
     }
 }
 
-impl Watched<'_> {
+impl ProgressReporter<'_> {
     /// The render has ended with this picture.
     pub(crate) fn finish(&self, picture: &Image) {
         self.display.finish();
@@ -97,7 +97,7 @@ impl Watched<'_> {
     }
 }
 
-impl Progress for Watched<'_> {
+impl Progress for ProgressReporter<'_> {
     fn state(&self, state: &State) {
         let pass = self.pass.lock().map(|pass| *pass).unwrap_or_default();
         self.display.state(state, &pass, self.series.as_ref());

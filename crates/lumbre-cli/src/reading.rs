@@ -309,7 +309,7 @@ impl ReadingArguments {
         let mut options = self.options(time)?;
         self.pov_options(number, &mut options.pov);
         options.variant = variant.map(str::to_owned);
-        (options.is_alone, options.folder) = (folder.is_some(), folder.map(Path::to_owned));
+        (options.only_named_files, options.folder) = (folder.is_some(), folder.map(Path::to_owned));
         let read = lumbre::describe(&paths, &options);
         let (mut desc, diagnostics) = read.map_err(|error| memory.explain(error))?;
         for path in &self.overlay {

@@ -28,7 +28,7 @@ use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
 use crate::output::{self, Inputs, Pictures, Replaced, is_standard_stream};
 use crate::preview::{Preview, Protocol};
-use crate::progress::{Display, PictureViewer, Series, Style, Watched};
+use crate::progress::{Display, PictureViewer, ProgressReporter, Series, Style};
 use crate::reading::{Frames, ReadingArguments, print_warnings};
 use crate::report::{caustics_line, caustics_not_found, statistics, summary, warn_of_losses};
 use crate::signals::{Deadline, Phase, Signals};
@@ -247,23 +247,24 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     signals.enter(READING);
     let mut stage = arguments.staging.stage(arguments.size, arguments.reading.limits())?;
     arguments.view.set(&mut stage)?;
-    let began = start;
+    let render_start = start;
     // The first picture's name and exposure are used for all.
     let mut from_first = First { pattern: None, exposure: arguments.exposure };
     if let Some(Frames(frames)) = &arguments.frames {
         let (first, last) = (*frames.start(), *frames.end());
-        let mut held = FirstStage::default();
+        let mut first_stage = FirstStage::default();
         for number in frames.clone() {
             let start = Instant::now();
             signals.end_at(arguments.deadline(start));
             signals.enter(READING);
             let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
-            let series = Series { number, done: number - first, count: last - first + 1, start: began };
+            let series =
+                Series { number, done: number - first, count: last - first + 1, start: render_start };
             let frame = Frame { number, is_first: number == first, series };
             if !arguments.quiet {
                 say!("{series}");
             }
-            let frame = Some((frame, &mut held));
+            let frame = Some((frame, &mut first_stage));
             let context =
                 Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
             picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
@@ -285,7 +286,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
                     // The time of the first one includes reading.
                     let start = if turn == 0 { start } else { Instant::now() };
                     signals.end_at(arguments.deadline(start));
-                    let series = Series { number: turn + 1, done: turn, count: frames, start: began };
+                    let series = Series { number: turn + 1, done: turn, count: frames, start: render_start };
                     let frame = Frame { number: turn + 1, is_first: turn == 0, series };
                     // Each rotation has its own camera.
                     let frame = Some((frame, &mut FirstStage::default()));
@@ -319,7 +320,7 @@ const READING: Phase = Phase::Preparing("reading the scene");
 
 impl Arguments {
     /// Passes the picture options to the POV-Ray reader.
-    pub(crate) fn tell_reader(&mut self) {
+    pub(crate) fn pass_options_to_reader(&mut self) {
         if self.scene.iter().any(|path| SceneFormat::from_path(path) == Some(SceneFormat::Pov)) {
             self.reading.tell_pov(self.size, self.frames.as_ref());
         }
@@ -569,8 +570,8 @@ fn picture(
     stage.ground = Defaults::ground(stage.ground, is_of_light);
     let staged = stage.set(&mut desc);
     let defaults = Defaults::new(staged, is_of_light);
-    if let Some((_, held)) = frame {
-        held.hold(&staged, &mut desc);
+    if let Some((_, first_stage)) = frame {
+        first_stage.hold(&staged, &mut desc);
     }
     let behind = arguments.staging.behind(&defaults, arguments.reading.limits_beside(diagnostics))?;
     let name = &arguments.scene[0];
@@ -671,7 +672,8 @@ fn picture(
     let is_silent = arguments.quiet || arguments.preview.is_some();
     let style = if is_silent { Style::None } else { arguments.progress };
     let viewers = arguments.viewers(&output, tone_map, exposure)?;
-    let progress = Watched { display: Display::new(style), signals, viewers, series, pass: Mutex::default() };
+    let progress =
+        ProgressReporter { display: Display::new(style), signals, viewers, series, pass: Mutex::default() };
     let render_start = Instant::now();
     if let Some(deadline) = arguments.deadline(start) {
         // The time left after reading and building.

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn packets_have_their_length_and_cover_the_picture_once_a_channel() {
+    fn packets_cover_the_picture_once_per_channel() {
         let made = create("fox", (5, 70));
         assert_eq!(
             (number(&made, 0) as usize, made[4], made[5], &made[6..10]),

@@ -14,7 +14,7 @@ fn has(bytes: &[u8], words: &[u8]) -> bool {
 }
 
 #[test]
-fn an_exr_keeps_the_noisy_picture_and_says_what_the_other_went_through() {
+fn an_exr_keeps_the_noisy_picture_and_names_the_denoiser() {
     let desk = Desk::new();
     desk.write("sphere.pbrt", SPHERE);
     let noisy = desk.lumbre(&["sphere.pbrt", "-o", "noisy.exr"]);
@@ -66,7 +66,7 @@ fn a_png_shows_the_picture_without_noise() {
 }
 
 #[test]
-fn a_denoiser_that_is_not_there_is_missed_before_anything_is_rendered() {
+fn a_missing_denoiser_is_reported_before_rendering() {
     let desk = Desk::new();
     desk.write("sphere.pbrt", SPHERE);
     fs::create_dir(desk.path("empty")).unwrap();
@@ -100,7 +100,7 @@ const GLTF: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nod
 "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,AABAwAAAAAAAAAAAAACAQAAAAAAAAAAAAAAAAAAAAEAAAAAA"}]}"#;
 
 #[test]
-fn a_model_in_the_studio_has_no_noise_unless_it_is_asked_for_and_few_samples_unless_others_are() {
+fn studio_models_are_denoised_with_few_samples_by_default() {
     let desk = Desk::new();
     desk.write("a.obj", "v -3 0 0\nv 4 0 0\nv 4 2 1\nv -3 2 1\nf 1 2 3 4\n");
     desk.write("sphere.pbrt", SPHERE);

@@ -387,7 +387,7 @@ fn a_shape_that_is_missed_is_explained_and_by_how_much() {
 }
 
 #[test]
-fn the_intervals_of_csg_are_those_of_the_whole_line_and_operands_have_names() {
+fn csg_intervals_cover_the_line_and_operands_have_names() {
     let desk = Desk::new();
     let shapes = r#"ObjectBegin "ball" Translate 0 0 -2 Shape "sphere" "float radius" 1.5 ObjectEnd
         ObjectBegin "block" Translate 0 0 0.5 Shape "box" "point3 p0" [-1 -1 -1] "point3 p1" [1 1 1] ObjectEnd
@@ -852,7 +852,7 @@ fn what_is_up_is_up_in_the_sketch_and_a_floor_does_not_fill_it() {
 }
 
 #[test]
-fn what_is_marked_lights_up_and_steps_and_sliders_wait_for_the_script() {
+fn marks_light_up_and_sliders_wait_for_the_script() {
     let desk = Desk::new();
     desk.write("a.pbrt", SCENE);
     let page = page(&desk, &["--pixel", "12,8"]);

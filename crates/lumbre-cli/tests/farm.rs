@@ -98,7 +98,7 @@ fn what_cannot_be_shared_out_is_refused() {
 }
 
 #[test]
-fn options_after_the_dashes_are_read_and_those_that_a_task_cannot_have_are_refused() {
+fn options_that_a_task_cannot_have_are_refused() {
     let folder = folder();
     // Scripts are run by hand, as where there is no scheduler.
     done(&folder, "farm slurm scene.pbrt --tasks 3 -- --spp 6 --max-depth 2");
@@ -145,7 +145,7 @@ fn options_after_the_dashes_are_read_and_those_that_a_task_cannot_have_are_refus
 }
 
 #[test]
-fn names_reach_a_script_as_names_and_what_no_script_can_hold_is_refused() {
+fn names_reach_scripts_quoted_or_are_refused() {
     let folder = folder();
     let scene = fs::read(folder.path("scene.pbrt")).unwrap();
     let farm = |scene: &str, more: &[&str]| {

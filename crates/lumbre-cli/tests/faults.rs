@@ -57,7 +57,7 @@ fn with_fault(folder: &Folder, fault: &str, k: u32) -> (i32, String, u32) {
 
 /// Every call of a render that writes, syncs or renames fails once: a render with a checkpoint, and with a picture to replace.
 #[test]
-fn a_call_that_fails_leaves_the_old_file_or_the_new_one_and_a_render_that_goes_on() {
+fn a_failed_call_leaves_the_old_or_the_new_file() {
     if !can_trace() {
         println!("skipped: strace is not here, or may not trace");
         return;
@@ -134,7 +134,7 @@ impl Drop for Mount {
 }
 
 #[test]
-fn a_full_disk_leaves_the_old_picture_and_keeps_the_pixels_elsewhere() {
+fn a_full_disk_keeps_the_old_picture_and_the_pixels() {
     let folder = folder();
     let Some(_mount) = Mount::new(&folder.path("full"), "size=16k") else {
         println!("skipped: no file system may be mounted");

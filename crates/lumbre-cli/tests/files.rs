@@ -206,7 +206,7 @@ fn no_file_that_a_scene_names_is_written_by_any_option() {
 }
 
 #[test]
-fn frames_and_turntables_spare_textures_whose_names_look_like_theirs() {
+fn frames_spare_textures_with_similar_names() {
     let folder = Folder::new();
     models(&folder);
     let texture = foreign_png(&folder.path("f.3.png"));

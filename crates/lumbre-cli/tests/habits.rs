@@ -44,7 +44,7 @@ fn image(desk: &Desk, name: &str) -> lumbre::image::Image {
 }
 
 #[test]
-fn what_looks_like_a_file_is_looked_for_and_what_cannot_be_read_is_told_apart() {
+fn missing_and_unreadable_files_get_different_messages() {
     let desk = Desk::new();
     desk.write("part.STP", "ISO-10303-21;");
     fs::create_dir(desk.path("model")).unwrap();
@@ -582,7 +582,7 @@ fn diff_takes_one_of_its_pictures_from_standard_input() {
 }
 
 #[test]
-fn a_model_that_plainly_stands_on_a_plane_of_z_has_z_up_unless_told() {
+fn a_model_on_a_plane_of_z_has_z_up_by_default() {
     let desk = Desk::new();
     // A pole on a wide slab.
     let box_of = |[x, y, from, to]: [f64; 4], first: usize| {

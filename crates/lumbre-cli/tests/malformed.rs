@@ -66,7 +66,7 @@ fn unescaped(text: &str) -> Vec<u8> {
 }
 
 #[test]
-fn every_malformed_file_is_refused_in_the_words_of_the_catalogue() {
+fn every_malformed_file_gets_its_message() {
     let catalogue = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/malformed");
     let folder = Folder::new();
     folder.write("good.pbrt", &format!("{HEAD}Shape \"sphere\"\n"));

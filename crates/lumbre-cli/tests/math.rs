@@ -64,7 +64,7 @@ fn quat(value: &Value) -> String {
 }
 
 #[test]
-fn every_reference_vector_of_vectors_transforms_cameras_and_quaternions_holds() {
+fn reference_vectors_hold() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/vectors.json");
     let all: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let mut seen = 0;
@@ -318,7 +318,7 @@ fn json_has_the_value_its_kind_and_the_steps() {
 }
 
 #[test]
-fn lines_of_standard_input_share_names_and_go_on_where_a_bracket_is_open() {
+fn input_lines_share_names_and_continue_in_brackets() {
     let out = piped(&["math"], "v = [3,\n 4]\nlength(v)\nans * 2\n\nquit\n1 / 0\n");
     assert_eq!(code(&out), 0, "{}", stderr(&out));
     let text = stdout(&out);
@@ -328,7 +328,7 @@ fn lines_of_standard_input_share_names_and_go_on_where_a_bracket_is_open() {
 }
 
 #[test]
-fn mistakes_have_their_place_and_the_exit_status_of_their_source() {
+fn errors_have_a_place_and_the_right_exit_status() {
     let desk = Desk::new();
     let out = desk.lumbre(&["math", "dott(x, y)"]);
     assert_eq!((code(&out), stdout(&out).as_str()), (2, ""));
@@ -394,7 +394,7 @@ fn help_lists_the_functions() {
 
 /// Rows of its tables of functions are: call, meaning, example, result.
 #[test]
-fn the_manual_has_every_form_of_every_function_with_an_example_that_is_right() {
+fn every_function_has_a_correct_example_in_the_manual() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/math.md");
     let manual = std::fs::read_to_string(path).unwrap();
     let desk = Desk::new();
@@ -481,7 +481,7 @@ fn matrices_are_singular_by_one_rule() {
 }
 
 #[test]
-fn steps_show_how_determinants_inverses_powers_and_quaternions_come_about() {
+fn steps_explain_determinants_inverses_and_powers() {
     let det = told("det([[2, 0, 1], [0, 3, 0], [1, 0, 1]])");
     assert!(
         det.contains("= 2·(3·1 - 0·0) - 0·(0·1 - 0·1) + 1·(0·0 - 3·1)\n  = 2·3 - 0·0 + 1·(-3) = 3\n"),

@@ -83,7 +83,7 @@ pub(crate) fn until_there(folder: &Folder, name: &str) {
 }
 
 #[test]
-fn parts_of_any_size_merged_in_any_order_are_the_file_of_one_run() {
+fn merged_parts_are_the_file_of_one_run() {
     let folder = folder();
     for (name, more) in [("whole.exr", ""), ("whole.png", "--tonemap agx --exposure 0.5")] {
         done(&folder, &format!("render scene.pbrt -o {name} {more}"));
@@ -146,7 +146,7 @@ fn parts_of_several_frames_are_merged_at_once() {
 }
 
 #[test]
-fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
+fn missing_doubled_foreign_and_damaged_parts_are_named() {
     let folder = folder();
     done(&folder, "render scene.pbrt -o a.part --samples 0..3");
     done(&folder, "render scene.pbrt -o b.part --samples 2..5");
@@ -214,7 +214,7 @@ fn what_is_missing_doubled_foreign_or_damaged_is_refused_by_name() {
 }
 
 #[test]
-fn parts_that_are_shown_in_two_ways_are_merged_in_the_one_that_is_asked_for() {
+fn parts_with_two_tone_mappings_merge_with_the_given_one() {
     let folder = folder();
     done(&folder, "render scene.pbrt -q -o a.part --samples 0..2 --exposure 1.5 --tonemap agx");
     done(&folder, "render scene.pbrt -q -o b.part --samples 2..4");
@@ -260,7 +260,7 @@ fn forged(folder: &Folder, (width, height): (u32, u32)) -> Vec<u8> {
 }
 
 #[test]
-fn a_part_that_claims_much_memory_is_refused_by_its_size_before_it_is_read() {
+fn a_part_that_claims_much_memory_is_refused_unread() {
     let folder = folder();
     for size in [(1000, 1000), (7000, 7000), (20_000, 20_000)] {
         let bytes = forged(&folder, size);
@@ -290,7 +290,7 @@ fn a_part_that_claims_much_memory_is_refused_by_its_size_before_it_is_read() {
 }
 
 #[test]
-fn what_a_part_says_of_itself_is_told_in_words_and_drives_no_terminal() {
+fn text_of_a_part_is_escaped_for_the_terminal() {
     let folder = folder();
     done(&folder, "render scene.pbrt -q -o a.part --samples 0..1 --lenient --eye 1,-6,2.5 --background #fa0");
     let mut part = lumbre::Part::open(&folder.path("a.part"), |_| u64::MAX).unwrap();
@@ -374,7 +374,7 @@ mod interrupted {
         "render scene.pbrt --spp 4000 --size 20x14 --threads 2 --progress none --checkpoint-every 20ms";
 
     #[test]
-    fn a_render_that_is_killed_time_and_again_comes_to_the_same_bytes() {
+    fn a_render_killed_many_times_gives_the_same_bytes() {
         let folder = folder();
         let arguments: Vec<&str> =
             RENDER.split_whitespace().chain(["-o", "a.exr", "--checkpoint", "ck", "--resume"]).collect();
@@ -496,7 +496,7 @@ mod interrupted {
     }
 
     #[test]
-    fn a_second_run_on_the_same_checkpoint_is_refused_by_whatever_name() {
+    fn a_second_run_on_a_checkpoint_is_refused() {
         let folder = folder();
         let arguments: Vec<&str> =
             RENDER.split_whitespace().chain(["-o", "a.exr", "--checkpoint", "ck"]).collect();

@@ -156,7 +156,7 @@ mod windows {
 
     /// From Windows 10 on; Wine cannot.
     #[test]
-    fn a_picture_is_replaced_while_a_program_that_allows_it_has_it_open() {
+    fn an_open_picture_is_replaced_if_its_reader_allows() {
         let folder = Folder::new();
         write(&folder, "a.pbrt", "images", "meshes");
         let expected = picture(&folder, "a.pbrt", "a.png");

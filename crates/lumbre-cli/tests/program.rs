@@ -81,7 +81,7 @@ fn a_scene_renders_under_its_own_film_name() {
 }
 
 #[test]
-fn each_extension_makes_its_format_and_all_hold_the_same_picture() {
+fn each_extension_makes_its_format_of_the_same_picture() {
     let desk = Desk::new();
     desk.write("scene.pbrt", SPHERE);
     for name in ["a.exr", "a.png", "a.hdr", "a.pfm", "a.jpg"] {
@@ -499,7 +499,7 @@ fn a_model_stands_whole_and_lit_before_its_background() {
 }
 
 #[test]
-fn a_transparent_picture_has_coverage_where_the_model_and_its_shadow_are() {
+fn transparent_pictures_cover_the_model_and_its_shadow() {
     let desk = Desk::new();
     desk.write("p.stl", PYRAMID);
     let render = |ground: &str| {
@@ -586,7 +586,7 @@ fn write_sliding_triangle(desk: &Desk, name: &str, nodes: &str) {
 }
 
 #[test]
-fn frames_are_pictures_of_their_times_with_motion_blur_where_it_is_asked_for() {
+fn frames_show_their_time_and_motion_blur_on_request() {
     let desk = Desk::new();
     write_sliding_triangle(&desk, "slide.gltf", "0,1");
     let render = |arguments: &[&str]| {
@@ -722,7 +722,7 @@ fn sunlit(lux: f32) -> String {
 }
 
 #[test]
-fn light_that_would_be_white_or_black_is_measured_unless_an_exposure_is_asked_for() {
+fn light_is_metered_unless_an_exposure_is_given() {
     let desk = Desk::new();
     let shown = |lux: f32, more: &[&str]| {
         desk.write("s.gltf", &sunlit(lux));

@@ -119,7 +119,7 @@ fn until(comes: impl Fn() -> bool) -> Option<()> {
 }
 
 #[test]
-fn slurm_renders_an_array_with_a_killed_task_and_merges_it_to_the_file_of_one_run() {
+fn slurm_gives_the_file_of_one_run_despite_a_killed_task() {
     let folder = folder();
     let Some(slurm) = Slurm::start(&folder) else {
         println!("skipped: Slurm is not installed, or cannot be started");

@@ -34,7 +34,7 @@ fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn glass_that_would_disperse_is_said_to_and_wavelengths_disperse_it() {
+fn dispersive_glass_is_noted_and_disperses_wavelengths() {
     let folder = folder();
     let (status, said) = run(&folder, "render scene.pbrt -o rgb.pfm");
     assert!(status == 0 && said.contains("--spectral") && said.contains("587.6 nm"), "{said}");

@@ -52,7 +52,7 @@ fn start(folder: &Folder, arguments: &[&str]) -> Child {
 }
 
 #[test]
-fn a_signal_at_any_moment_leaves_the_old_file_or_a_whole_new_one() {
+fn a_signal_leaves_the_old_file_or_a_whole_new_one() {
     let folder = Folder::new();
     room(&folder, (8, 6), 5);
     let old = b"the old file".to_vec();
@@ -135,7 +135,7 @@ fn a_signal_ends_reading_and_waiting_for_pipes() {
 }
 
 #[test]
-fn time_that_is_over_in_the_first_pass_leaves_a_coarse_whole_picture() {
+fn a_time_limit_in_the_first_pass_leaves_a_coarse_picture() {
     let folder = Folder::new();
     // So large that no machine ends a pass in time.
     room(&folder, (3000, 2000), 200);
@@ -194,7 +194,7 @@ fn is_ignored(signal: i32) -> bool {
 }
 
 #[test]
-fn every_signal_that_asks_for_an_end_keeps_the_picture_and_the_checkpoint() {
+fn every_end_signal_keeps_picture_and_checkpoint() {
     let folder = Folder::new();
     room(&folder, (8, 6), 5);
     let arguments = [

@@ -41,7 +41,7 @@ Shape "disk" "float radius" 8
 "#;
 
 #[test]
-fn a_noise_that_is_not_reached_is_said_with_the_option_that_goes_on() {
+fn a_missed_noise_target_names_the_option_to_continue() {
     let folder = Folder::new();
     folder.write("scene.pbrt", RARE);
     let run = |more: &str| {

@@ -71,7 +71,7 @@ fn a_terminal_shows_the_picture_and_what_is_none_is_refused() {
 }
 
 #[test]
-fn a_viewer_prints_its_address_answers_there_and_ends_by_a_signal() {
+fn a_viewer_answers_at_its_address_until_a_signal() {
     let desk = Desk::new();
     desk.write("scene.pbrt", SPHERE);
     let mut child = Command::new(env!("CARGO_BIN_EXE_lumbre"))

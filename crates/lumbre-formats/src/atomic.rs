@@ -556,7 +556,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_and_missing_folders_are_refused_before_and_while_writing() {
+    fn folders_and_missing_folders_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let places = [folder.path().to_owned(), folder.path().join("absent/a.png"), "..".into()];
         for path in places {

@@ -557,7 +557,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vector_pays_for_its_room_and_gives_back_what_it_does_not_keep() {
+    fn a_vector_charges_its_capacity_and_refunds_the_rest() {
         let b = small();
         let mut kept = BudgetVec::new(&b, "faces");
         for i in 0..40u32 {

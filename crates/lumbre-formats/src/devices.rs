@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn devices_have_their_names_with_any_ending_and_nothing_else_does() {
+    fn device_names_match_with_any_extension() {
         for name in ["nul", "NUL", "Nul"] {
             assert_eq!(device_of_name(name), Some(Device::Null), "{name}");
         }

@@ -703,7 +703,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_columns_count_characters_and_every_kind_of_line_end() {
+    fn lines_and_columns_count_characters_and_line_ends() {
         let text = "ab\r\nçd\rx\n\nyz".as_bytes();
         let at = |needle: u8| {
             let offset = text.iter().position(|&b| b == needle).unwrap();

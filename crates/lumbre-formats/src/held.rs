@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn names_lead_to_their_files_by_any_way_within_the_topmost_folder() {
+    fn names_resolve_within_the_topmost_folder() {
         let mut held = HeldFiles::default();
         held.insert("a/b.ply", *b"two");
         for name in ["a/b.ply", "./a/b.ply", "a/../a/./b.ply", "/a/b.ply", "../../a/b.ply"] {

@@ -440,7 +440,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_budget_of_a_folder_lets_files_in_it_be_opened_and_no_way_lead_out() {
+    fn a_folder_budget_opens_only_files_inside() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("dropped");
         std::fs::create_dir_all(folder.join("parts")).unwrap();

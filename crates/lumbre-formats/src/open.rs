@@ -36,7 +36,7 @@ pub struct ReadOptions {
     /// Options of a POV-Ray scene.
     pub pov: crate::pov::PovOptions,
     /// Whether the scene may use no other files than those that are named: for a scene from a stranger.
-    pub is_alone: bool,
+    pub only_named_files: bool,
     /// A folder, besides, whose files it may use all the same: one that holds no links.
     pub folder: Option<PathBuf>,
     /// The files in place of the system's; `None` for those of the system.
@@ -149,7 +149,7 @@ pub fn open_scenes(
     options: &ReadOptions,
 ) -> Result<(SceneDesc, Diagnostics), FormatError> {
     let mut budget = Budget::new(options.limits).of_held(options.held.clone());
-    if options.is_alone {
+    if options.only_named_files {
         budget = budget.only(paths.iter().map(|path| path.as_ref().to_owned()));
         if let Some(folder) = &options.folder {
             budget = budget.and_in(folder.clone());

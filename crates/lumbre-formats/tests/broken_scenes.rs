@@ -689,7 +689,7 @@ fn includes_that_fan_out_stop_at_the_limit_of_files() {
 }
 
 #[test]
-fn files_that_are_included_again_and_again_stop_at_the_limit_of_expansion() {
+fn repeated_includes_stop_at_the_expansion_limit() {
     let dir = tempfile::tempdir().unwrap();
     // Eight of them are free.
     let size = Limits::FREE_EXPANSION / 8;

@@ -250,7 +250,7 @@ fn thin(scene: &SceneDesc) -> (f64, Rgb) {
 }
 
 #[test]
-fn points_and_lines_are_as_wide_as_the_model_asks_and_of_a_colour_that_is_seen() {
+fn points_and_lines_have_a_visible_width_and_colour() {
     // A square of 5 by its diagonal, at twice its size, and another far to its right: 50 across, and 8 high.
     let scene = |mode: u32, material: &str| {
         let mut parts = Parts::default();
@@ -299,7 +299,7 @@ fn colour_of_default_surface() -> Rgb {
 }
 
 #[test]
-fn images_of_another_kind_than_they_are_said_to_be_are_read_and_named() {
+fn images_of_the_wrong_declared_type_are_read_with_a_note() {
     let image = picture([51, 102, 204], image::ImageFormat::Png);
     let escaped: String = image.iter().map(|byte| format!("%{byte:02x}")).collect();
     let said = |image: &str| {
@@ -404,7 +404,7 @@ fn quantized_numbers_of_every_type_are_read() {
 }
 
 #[test]
-fn sparse_accessors_replace_some_elements_with_a_base_and_without() {
+fn sparse_accessors_work_with_and_without_a_base() {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
     parts.add(&[1, 3], r#""componentType":5121,"type":"SCALAR","count":2"#);
@@ -806,7 +806,7 @@ fn animations_by_pointers_change_what_they_name() {
 }
 
 #[test]
-fn one_of_several_animations_is_chosen_and_those_that_disagree_do_not_mix() {
+fn one_animation_is_chosen_and_conflicting_ones_do_not_mix() {
     let mut parts = Parts::default();
     let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
     let moves = [8.0, 16.0].map(|far| {
@@ -1210,7 +1210,7 @@ fn four_sets_of_texture_coordinates_serve_one_material() {
 }
 
 #[test]
-fn of_many_sets_of_texture_coordinates_those_are_kept_that_the_material_names() {
+fn texture_coordinate_sets_that_materials_use_are_kept() {
     // Two of eight, one of them the last, take the room of two.
     let (scene, warnings) = with_sets(8, [7, 3, 7, 3, 7]);
     assert_eq!(warnings, [""; 0]);
@@ -1342,7 +1342,7 @@ fn unlit_shines_and_solids_scatter_inside() {
 }
 
 #[test]
-fn tangents_are_made_for_normal_maps_and_those_of_the_file_keep_their_side() {
+fn missing_tangents_are_made_and_given_ones_are_kept() {
     let material = r#""images":[{"uri":"data:image/png;base64,iVBORw0KGgo="}],"textures":[{"source":0}]"#;
     let square = |attributes: &[&str], material: &str| {
         let mut parts = Parts::default();
@@ -1699,7 +1699,7 @@ fn broken_files_are_refused_with_a_pointer_and_a_reason() {
 }
 
 #[test]
-fn indices_beyond_the_vertices_and_numbers_that_are_none_are_found_and_forgiven() {
+fn bad_indices_and_nan_numbers_give_warnings() {
     let mut parts = Parts::default();
     let mut square = SQUARE;
     square[3][1] = f32::NAN;

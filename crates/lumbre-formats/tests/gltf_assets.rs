@@ -86,7 +86,7 @@ fn malformed_files_are_refused_at_their_place_and_cost_little() {
 }
 
 #[test]
-fn what_the_validator_refuses_is_refused_and_what_it_warns_of_reads() {
+fn files_are_refused_as_by_the_validator() {
     let Some(folder) = shared("gltf/gltf-validator") else { return };
     let mut failures = vec![];
     let mut refused = 0;

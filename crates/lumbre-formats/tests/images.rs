@@ -278,7 +278,7 @@ fn what_an_image_unpacks_to_is_bounded_before_it_is_unpacked() {
 }
 
 #[test]
-fn nothing_finite_becomes_infinite_in_an_exr_and_a_qoi_keeps_its_bytes() {
+fn exr_values_stay_finite_and_qoi_keeps_its_bytes() {
     let bright = Image::filled(3, 2, Rgb::new(70_000.0, 2.0, -0.5));
     let bytes = encode_image(&bright, ImageFormat::Exr, &WriteOptions::default()).unwrap();
     let read = |bytes: &[u8], name: &str| {

@@ -30,7 +30,7 @@ fn said(text: &str, strictness: Strictness) -> (ObjFile, Vec<String>) {
 const SQUARE: &str = "v 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\n";
 
 #[test]
-fn corners_that_differ_in_any_attribute_are_vertices_of_their_own() {
+fn corners_with_different_attributes_are_separate_vertices() {
     let file = read(
         "v 1 1 5\nv 4 1 5\nv 4 3 5\nv 1 3 5\nvt 0.25 0.5\nvt 0.75 0.5 9\nvt 0.5\nvn 0 0 1\nvn 0 1 0\n\
          f 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/2/1\nf 1/1/2 2/2/1 4/2/1\n",
@@ -143,7 +143,7 @@ fn colours_of_vertices_are_light_and_others_white() {
 }
 
 #[test]
-fn a_long_line_and_many_attributes_of_one_vertex_take_no_more_than_their_time() {
+fn long_lines_and_many_attributes_take_linear_time() {
     let corners = 200_000;
     let mut text = String::new();
     for i in 0..corners {
@@ -375,7 +375,7 @@ fn text_in_sixteen_bits_is_read_by_its_byte_order_mark() {
 }
 
 #[test]
-fn a_transparency_of_one_alone_is_opaque_and_d_decides_between_the_two() {
+fn tr_of_one_is_opaque_and_d_takes_precedence() {
     let opacity = |keys: &str| {
         let mut said = Diagnostics::new();
         let text = format!("newmtl a\n{keys}\n");
@@ -395,7 +395,7 @@ fn a_transparency_of_one_alone_is_opaque_and_d_decides_between_the_two() {
 }
 
 #[test]
-fn a_library_is_read_once_and_what_shines_faintly_leaves_the_studio() {
+fn libraries_are_read_once_and_faint_lights_keep_the_studio() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("m.obj");
     let light = |emission: &str| {

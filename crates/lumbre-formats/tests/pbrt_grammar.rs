@@ -252,7 +252,7 @@ fn scopes_give_back_the_whole_state() {
 }
 
 #[test]
-fn attribute_defaults_stand_behind_own_parameters_and_within_their_scope() {
+fn attribute_defaults_yield_to_parameters_and_end_with_scope() {
     let scene = world(
         "AttributeBegin
            Attribute \"shape\" \"float radius\" 3 \"float alpha\" .5 \"float unused\" 1
@@ -507,7 +507,7 @@ fn curves_that_differ_in_their_points_alone_are_one_shape() {
 }
 
 #[test]
-fn normals_of_a_curve_that_is_no_ribbon_are_left_out_with_a_warning() {
+fn normals_of_other_curves_than_ribbons_are_ignored() {
     let (scene, warnings) =
         warned(r#"Shape "curve" "normal N" [0 0 1 0 1 0] "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]"#);
     assert_eq!(warnings, ["warning: scene.pbrt:1:26: normals are of use to curves of type \"ribbon\" only"]);
@@ -775,7 +775,7 @@ fn colour_spaces_change_reflectances_and_lights() {
 // Lights.
 
 #[test]
-fn rgb_lights_keep_their_numbers_and_other_spectra_become_one_nit() {
+fn rgb_lights_keep_numbers_and_spectra_become_one_nit() {
     let scene = world(
         r#"LightSource "point" "rgb I" [3 4 5] "float scale" 2 "point3 from" [1 2 3]
            LightSource "point" "blackbody I" 3000 "float scale" 2
@@ -870,7 +870,7 @@ fn environments_are_equal_area_or_latitude_longitude() {
 }
 
 #[test]
-fn goniometric_lights_shine_as_their_image_says_y_and_z_exchanged() {
+fn goniometric_lights_exchange_y_and_z_of_their_image() {
     let dir = tempfile::tempdir().unwrap();
     let options = lumbre_formats::image::WriteOptions::default();
     // The mean of the channels counts. In the square the middle is +z of the image's own space, which is +y of the light's.
@@ -1033,7 +1033,7 @@ fn samplers_and_integrators_are_read_and_the_last_wins() {
 }
 
 #[test]
-fn integrators_that_find_caustics_are_rendered_by_the_one_that_does() {
+fn integrators_for_caustics_map_to_caustics() {
     for (name, differs) in [
         ("sppm", "its radius is a few pixels"),
         ("bdpt", "it connects no vertices"),
@@ -1258,7 +1258,7 @@ fn transform_begin_of_the_current_version_saves_everything() {
 }
 
 #[test]
-fn textures_may_be_defined_after_the_materials_and_shapes_that_name_them() {
+fn textures_may_be_defined_after_their_use() {
     let scene = world(
         r#"Material "diffuse" "texture reflectance" "later" Shape "sphere" "texture alpha" "holes"
            MakeNamedMaterial "a" "string type" "diffuse" "texture reflectance" "later"

@@ -56,7 +56,7 @@ fn mesh(scene: &SceneDesc) -> &MeshDesc {
 }
 
 #[test]
-fn a_root_of_a_scene_that_hangs_on_another_node_is_shown_where_the_scene_has_it() {
+fn a_root_that_is_also_a_child_is_shown_as_a_root() {
     let json = triangle(&[
         (r#""nodes":[0]"#, r#""nodes":[1]"#),
         (r#""nodes":[{"mesh":0}]"#, r#""nodes":[{"children":[1],"translation":[7,7,7]},{"mesh":0}]"#),
@@ -65,7 +65,7 @@ fn a_root_of_a_scene_that_hangs_on_another_node_is_shown_where_the_scene_has_it(
 }
 
 #[test]
-fn attributes_one_after_another_in_a_view_without_a_stride_are_read() {
+fn attributes_in_a_view_without_stride_are_read() {
     let json = triangle(&[
         (r#"{"POSITION":0}"#, r#"{"POSITION":0,"NORMAL":1}"#),
         (
@@ -149,7 +149,7 @@ fn parts_that_nothing_uses_may_be_wrong() {
 }
 
 #[test]
-fn chunks_of_a_glb_may_have_a_length_that_is_no_multiple_of_four() {
+fn glb_chunk_lengths_need_not_be_multiples_of_four() {
     let mut json = triangle(&[(&format!(r#","uri":"{BUFFER}""#), "")]);
     while json.len() % 4 != 1 {
         json.push(' ');
@@ -286,7 +286,7 @@ fn a_specular_colour_takes_its_share_from_the_diffuse_one() {
 }
 
 #[test]
-fn a_map_that_makes_one_point_of_everything_shows_one_colour_where_it_shines_too() {
+fn a_map_to_one_point_shows_one_colour() {
     // An image of 2 by 1 pixels, red and blue.
     let image = {
         let mut bytes = std::io::Cursor::new(vec![]);
@@ -339,7 +339,7 @@ fn a_map_that_makes_one_point_of_everything_shows_one_colour_where_it_shines_too
 }
 
 #[test]
-fn a_line_of_a_ply_header_that_lacks_its_word_comment_is_passed_over() {
+fn unknown_ply_header_lines_are_skipped() {
     let text = "ply\nformat ascii 1.0\nWritten by hand, source: none\nelement vertex 3\nproperty float x\nproperty float y\n\
                 property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
                 3 0 2\n0 4 2\n0 0 2\n3 0 1 2\n";

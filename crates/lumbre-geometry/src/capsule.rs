@@ -478,7 +478,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_capsule_is_refused_by_the_name_of_the_parameter() {
+    fn bad_capsules_are_refused_with_the_parameter() {
         let (p, q) = (DVec3::new(0.4, 1.2, -0.3), DVec3::new(2.0, 0.3, 0.9));
         let huge = DVec3::new(f64::MAX, 0.4, 0.4);
         let cases = [

@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sphere_and_a_torus_have_the_crossings_of_their_closed_forms() {
+    fn implicit_spheres_and_tori_match_closed_forms() {
         let sphere = ImplicitSurface::new(around(CENTER, 1.5), |[x, y, z]| {
             (x - CENTER.x).square() + (y - CENTER.y).square() + (z - CENTER.z).square() - 1.25 * 1.25
         });

@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn magnitudes_bound_the_rounding_errors_of_what_they_are_computed_from() {
+    fn magnitudes_bound_rounding_errors() {
         fn expression<N: Number>() -> N {
             let [x, y, z] = [0.1, 0.7, -0.3].map(N::from);
             (x * y + z * x) * (y - z) - x * x * y

@@ -245,7 +245,7 @@ fn hold(law: u64, at_least: usize, check: impl Fn(&Subject, &mut Random) -> Opti
 }
 
 #[test]
-fn closest_is_the_first_of_the_roots_which_come_in_order_and_in_range() {
+fn closest_is_the_first_root_in_order_and_range() {
     hold(1, 66, |subject, random| {
         let mut hits = 0;
         for _ in 0..4000 {
@@ -275,7 +275,7 @@ fn closest_is_the_first_of_the_roots_which_come_in_order_and_in_range() {
 }
 
 #[test]
-fn t_is_in_units_of_the_direction_and_a_reversed_ray_meets_the_same_points() {
+fn t_is_in_direction_units_and_rays_can_be_reversed() {
     hold(2, 66, |subject, random| {
         let mut hits = 0;
         for _ in 0..3000 {
@@ -346,7 +346,7 @@ fn every_hit_lies_on_the_ray_and_in_the_box_which_is_tight() {
 }
 
 #[test]
-fn a_hit_point_aimed_at_from_elsewhere_is_hit_again_within_its_error() {
+fn a_hit_point_is_hit_again_from_elsewhere() {
     hold(4, 66, |subject, random| {
         let mut hits = 0;
         for _ in 0..2000 {
@@ -377,14 +377,14 @@ fn a_hit_point_aimed_at_from_elsewhere_is_hit_again_within_its_error() {
 }
 
 #[test]
-fn a_ray_that_leaves_a_hit_does_not_find_it_again_but_finds_a_wall_close_by() {
+fn a_leaving_ray_misses_its_start_but_hits_a_near_wall() {
     leave(6000);
 }
 
 /// Takes about a minute: some hundred thousand rays a shape and placement.
 #[test]
 #[ignore = "slow"]
-fn a_ray_that_leaves_a_hit_does_not_find_it_again_among_very_many() {
+fn leaving_rays_never_hit_their_start_again() {
     leave(200_000);
 }
 
@@ -496,7 +496,7 @@ fn uv_and_its_derivatives_describe_the_surface() {
 }
 
 #[test]
-fn a_solid_is_entered_and_left_in_turn_and_holds_what_lies_between() {
+fn a_solid_is_entered_and_left_in_turn() {
     hold(7, 166, |subject, random| {
         if !subject.placed.shape().is_solid() {
             let p = subject.placed.world_from_object().inverse_point(subject.center());
@@ -566,7 +566,7 @@ fn random_lines_cross_as_often_as_the_area_says() {
 }
 
 #[test]
-fn points_chosen_by_area_lie_on_the_surface_as_densely_as_they_say() {
+fn area_samples_match_their_density() {
     hold(9, 5000, |subject, random| {
         if !subject.has_area() {
             assert!(subject.placed.sample_area(DVec2::splat(0.3)).is_none(), "{}", subject.name);
@@ -624,7 +624,7 @@ fn points_chosen_by_area_lie_on_the_surface_as_densely_as_they_say() {
 }
 
 #[test]
-fn directions_are_chosen_as_densely_as_they_say_from_outside_and_from_inside() {
+fn direction_samples_match_their_density() {
     hold(10, 5000, |subject, random| {
         if !subject.has_area() {
             assert!(
@@ -737,7 +737,7 @@ fn rays_that_are_none_miss() {
 }
 
 #[test]
-fn from_any_place_and_with_any_numbers_a_sample_is_a_point_of_the_surface_or_none() {
+fn samples_are_on_the_surface_or_none() {
     hold(12, 0, |subject, random| {
         let on_surface = subject.placed.sample_area(random.uv()).map_or(DVec3::ZERO, |s| s.surface.point);
         let corner = subject

@@ -64,7 +64,7 @@ fn a_patch_has_its_corners_at_the_corners_of_uv() {
 }
 
 #[test]
-fn what_makes_no_shape_is_refused_with_the_parameter_and_what_it_may_be() {
+fn bad_shapes_are_refused_with_parameter_and_range() {
     let (o, inf, nan) = (v(2.0, 3.0, 5.0), f64::INFINITY, f64::NAN);
     let ball = || Sphere::new(o, 1.5).unwrap();
     let refused: Vec<(&str, Option<ShapeError>)> = vec![

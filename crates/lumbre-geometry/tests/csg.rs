@@ -307,7 +307,7 @@ fn a_solid_without_itself_is_nothing_and_with_itself_is_itself() {
 }
 
 #[test]
-fn of_coinciding_surfaces_the_first_leaf_that_matters_has_the_result() {
+fn the_first_deciding_leaf_owns_coinciding_surfaces() {
     let (low, high) = (DVec3::new(0.5, 0.5, 0.5), DVec3::new(2.0, 2.5, 3.0));
     let away = cuboid(DVec3::splat(10.0), DVec3::splat(12.0));
     // The first leaf has the same face, but only inside an intersection that is empty there.
@@ -397,7 +397,7 @@ fn a_strangers_solid_is_an_operand_like_any_other() {
 }
 
 #[test]
-fn a_csg_shape_under_a_transform_is_taken_apart_and_stays_the_same() {
+fn transformed_csg_is_the_same_after_it_is_split() {
     let mut scene = Scene { random: RandomStream::new(8), center: DVec3::new(1.0, 2.0, 0.5), size: 1.5 };
     let mut hits = 0;
     for _ in 0..50 {

@@ -183,7 +183,7 @@ fn no_ray_passes_where_segments_or_pieces_meet() {
 }
 
 #[test]
-fn a_straight_curve_is_a_ribbon_towards_every_ray_and_its_ends_are_cut() {
+fn a_straight_curve_faces_every_ray_and_ends_flat() {
     let points: Vec<DVec3> = (0..4).map(|i| CENTER + DVec3::X * 2.0 * f64::from(i)).collect();
     let strand = Strand::new(CurveBasis::Bezier, 3, &points, [0.5, 0.25]).unwrap();
     for kind in [CurveKind::Flat, CurveKind::Cylinder] {
@@ -348,7 +348,7 @@ fn what_is_no_curve_is_refused() {
 }
 
 #[test]
-fn rays_and_curves_of_all_sizes_meet_nothing_or_something_finite() {
+fn curves_of_all_sizes_give_finite_hits_or_none() {
     let mut random = RandomStream::new(75);
     let mut hits = 0;
     for size in [1e-30, 1e-6, 1.0, 1e6, 1e30] {

@@ -417,7 +417,7 @@ fn no_crossing_of_a_slender_shape_is_lost_invented_or_off() {
 }
 
 #[test]
-fn no_crossing_of_a_cone_is_lost_invented_or_off_along_generators_and_through_the_apex() {
+fn cones_are_exact_along_generators_and_at_the_apex() {
     let mut random = Random(RandomStream::new(4));
     let mut tally = Tally::default();
     for i in 0..400 * repeats() {
@@ -482,7 +482,7 @@ fn a_ray_along_a_generator_ends_at_the_apex() {
 }
 
 #[test]
-fn no_crossing_is_lost_invented_or_off_along_asymptotes_and_axes() {
+fn quadrics_are_exact_along_asymptotes_and_axes() {
     let mut random = Random(RandomStream::new(5));
     let mut tallies: Vec<(&str, Tally)> = vec![];
     for _ in 0..20 * repeats() {

@@ -194,7 +194,7 @@ fn hold(
 }
 
 #[test]
-fn an_explanation_has_the_hits_of_the_search_and_tells_the_truth_of_every_other_crossing() {
+fn explanations_have_the_hits_and_true_reasons_for_others() {
     let rays = if is_long() { 1250 } else { 40 };
     let (mut fates, mut hits_of) = (BTreeMap::new(), BTreeMap::<String, usize>::new());
     for subject in contract::subjects() {
@@ -424,7 +424,7 @@ fn a_triangle_is_explained_by_three_tests_that_agree() {
 }
 
 #[test]
-fn a_direction_of_any_length_is_explained_and_one_that_is_none_is_said_to_be() {
+fn directions_of_any_length_are_explained() {
     let sphere = Shape::from(Sphere::new(DVec3::new(0.0, 0.0, 5.0), 2.0).unwrap());
     for length in [1e-200, 1e200] {
         let ray = Ray::new(DVec3::ZERO, DVec3::new(0.0, 0.0, length));
@@ -463,7 +463,7 @@ fn fates_of(csg: Result<Csg, ShapeError>, ray: &Ray) -> (Vec<(f64, Fate)>, Vec<[
 }
 
 #[test]
-fn a_crossing_of_an_operand_that_is_none_of_the_result_names_the_operand_that_is_why() {
+fn a_rejected_crossing_names_the_deciding_operand() {
     let leaf = |shape: Result<Shape, ShapeError>| {
         Csg::leaf(PlacedShape::new(shape.unwrap(), Transform::IDENTITY)).unwrap()
     };

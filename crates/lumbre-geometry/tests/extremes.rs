@@ -175,7 +175,7 @@ fn a_direction_of_any_length_finds_what_a_unit_one_does() {
 }
 
 #[test]
-fn every_normal_is_a_unit_vector_however_small_or_far_away_the_shape() {
+fn normals_are_unit_for_tiny_and_distant_shapes() {
     let mut random = RandomStream::new(23);
     let sizes = [1e-300, 1e-170, 1e-60, 1e-17, 1e-3, 1.0, 1e6, 1e30];
     let distances = [0.0, 1e-12, 1.0, 1e6, 1e12, 1e17, 1e20, 1e90, 1e200];
@@ -207,7 +207,7 @@ fn every_normal_is_a_unit_vector_however_small_or_far_away_the_shape() {
 }
 
 #[test]
-fn a_ball_too_small_or_too_far_to_see_faces_the_ray_that_hits_it() {
+fn tiny_and_distant_balls_face_their_ray() {
     let v = DVec3::new;
     let capsule = |size: f64| Capsule::new(v(0.0, 0.0, -size), v(0.0, 0.0, size), size).unwrap();
     let stretched = Transform::scale(v(1e-17, 2e-17, 3e-17)).unwrap();

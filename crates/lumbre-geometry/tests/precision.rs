@@ -83,7 +83,7 @@ fn worst_ulps(shape: impl Into<Shape>, center: DVec3, residual: impl Fn(&Ray, f6
 }
 
 #[test]
-fn a_sphere_is_exact_to_a_few_units_in_the_last_place_at_any_distance() {
+fn spheres_are_exact_to_a_few_ulps_at_any_distance() {
     let (center, radius) = (DVec3::new(3.25, -7.5, 2.0), 1.7);
     let residual = |ray: &Ray, t: f64| {
         let [x, y, z] = place(ray, t, center);
@@ -96,7 +96,7 @@ fn a_sphere_is_exact_to_a_few_units_in_the_last_place_at_any_distance() {
 }
 
 #[test]
-fn a_cylinder_is_exact_to_a_few_units_in_the_last_place_at_any_distance() {
+fn cylinders_are_exact_to_a_few_ulps_at_any_distance() {
     let radius = 1.3;
     let residual = |ray: &Ray, t: f64| {
         let [x, y, _] = place(ray, t, DVec3::ZERO);
@@ -110,7 +110,7 @@ fn a_cylinder_is_exact_to_a_few_units_in_the_last_place_at_any_distance() {
 }
 
 #[test]
-fn a_cone_is_exact_to_a_few_units_in_the_last_place_at_any_distance() {
+fn cones_are_exact_to_a_few_ulps_at_any_distance() {
     // Radius 2 - z/2 from z = 0 to 3.
     let residual = |ray: &Ray, t: f64| {
         let [x, y, z] = place(ray, t, DVec3::ZERO);
@@ -126,7 +126,7 @@ fn a_cone_is_exact_to_a_few_units_in_the_last_place_at_any_distance() {
 }
 
 #[test]
-fn a_plane_is_exact_to_a_few_units_in_the_last_place_at_any_distance() {
+fn planes_are_exact_to_a_few_ulps_at_any_distance() {
     let (point, normal) = (DVec3::new(3.25, -7.5, 2.0), DVec3::new(2.0, 3.0, -6.0));
     let residual = |ray: &Ray, t: f64| {
         let [x, y, z] = place(ray, t, point);

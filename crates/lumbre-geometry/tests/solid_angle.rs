@@ -89,7 +89,7 @@ fn a_rectangle_is_sampled_uniformly_by_solid_angle() {
 }
 
 #[test]
-fn a_sphere_is_sampled_uniformly_by_solid_angle_near_and_very_far() {
+fn spheres_are_sampled_uniformly_by_solid_angle() {
     let (center, radius) = (DVec3::new(3.0, -2.0, 5.0), 2.5);
     let ball = Shape::from(Sphere::new(center, radius).unwrap());
     let toward = DVec3::new(2.0, 3.0, -6.0) / 7.0;

@@ -62,7 +62,7 @@ fn leaks(single: bool, rays: usize) -> (usize, usize, usize) {
 }
 
 #[test]
-fn no_ray_aimed_at_a_side_or_a_corner_slips_through_the_watertight_test() {
+fn rays_at_edges_and_corners_hit() {
     for single in [false, true] {
         let (aimed, through_fast, through_watertight) = leaks(single, 20_000);
         println!(

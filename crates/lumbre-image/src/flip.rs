@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn black_against_white_and_green_against_blue_are_near_the_largest_error() {
+    fn opposite_colours_are_near_the_largest_error() {
         let extremes = [(Rgb::BLACK, Rgb::WHITE), (Rgb::new(0.0, 1.0, 0.0), Rgb::new(0.0, 0.0, 1.0))];
         for (a, b) in extremes {
             let error = mean(&flip(&one(a), &one(b)).unwrap());

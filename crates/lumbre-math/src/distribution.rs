@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_sampled_in_proportion_and_never_where_the_weight_is_zero() {
+    fn samples_are_proportional_and_never_of_zero_weight() {
         let weights = [0.0, 2.0, 0.0, 0.0, 5.0, 1e-30, 1.0, 0.0];
         let line = PiecewiseConstant1D::new(&weights).unwrap();
         let mut counts = [0_u32; 8];
@@ -516,7 +516,7 @@ mod tests {
     }
 
     #[test]
-    fn an_alias_table_gives_each_thing_its_share_and_the_rest_is_uniform() {
+    fn an_alias_table_gives_shares_and_uniform_remainders() {
         for count in [1, 2, 5, 64, 1000] {
             let mut weights = random_weights(count as u64 + 50, count);
             weights[count / 2] = 2.0;

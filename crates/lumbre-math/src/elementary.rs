@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn they_are_those_of_the_standard_library_but_for_the_last_digits() {
+    fn elementary_functions_match_the_standard_library() {
         let mut random = RandomStream::new(12);
         for _ in 0..20_000 {
             let unit = 2.0 * random.next_f64() - 1.0;

@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_numbers_have_the_determinants_inverses_and_solutions_of_fractions() {
+    fn integer_matrices_match_exact_fractions() {
         let mut random = RandomStream::new(9);
         let (mut singular, mut none, mut many) = (0, 0, 0);
         for i in 0..3_000 {

@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn rotations_of_any_length_agree_with_their_matrix_and_come_back() {
+    fn rotations_agree_with_their_matrix_and_round_trip() {
         let mut random = RandomStream::new(14);
         let mut number = || 4.0 * random.next_f64() - 2.0;
         for _ in 0..1_000 {

@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn polynomials_up_to_degree_eight_give_back_the_roots_they_were_made_of() {
+    fn polynomials_up_to_degree_eight_give_back_their_roots() {
         every_known_root_is_found::<3>(1);
         every_known_root_is_found::<4>(2);
         every_known_root_is_found::<5>(3);
@@ -403,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn the_quartic_by_its_own_route_finds_what_the_general_one_finds() {
+    fn the_quartic_solver_agrees_with_the_general_one() {
         let mut state = 7;
         let mut count = 0;
         for _ in 0..50_000 {

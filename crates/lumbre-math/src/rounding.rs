@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_step_off_a_surface_clears_its_box_of_errors_on_the_right_side() {
+    fn offset_points_clear_the_error_box() {
         let mut random = RandomStream::new(6);
         let mut number = || 2.0 * random.next_f64() - 1.0;
         for k in 0..3_000 {

@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn many_dimensions_together_are_stratified_in_each_and_net_in_the_first_two() {
+    fn dimensions_are_stratified_and_the_first_two_a_net() {
         let sampler = OwenSobol::new(3);
         for dimension in [0, 7] {
             let points: Vec<[f32; DIMENSIONS]> =
@@ -446,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scramble_keeps_shared_leading_places_shared_and_is_one_to_one() {
+    fn scrambling_keeps_common_prefixes_and_is_bijective() {
         let mut random = RandomStream::new(8);
         for _ in 0..2_000 {
             let (a, b, seed) = (random.next_u64() as u32, random.next_u64() as u32, random.next_u64() as u32);

@@ -97,7 +97,7 @@ impl Source for Live {
 
     fn of_folder(&self, folder: &Path, scene: &Path) -> Arc<dyn Source> {
         let mut options = ReadOptions::default();
-        (options.is_alone, options.folder) = (true, Some(folder.to_owned()));
+        (options.only_named_files, options.folder) = (true, Some(folder.to_owned()));
         let origin = Origin::Files(vec![scene.to_owned()], Box::new(options));
         Arc::new(Self { origin, ..self.clone() })
     }

@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pixel_is_done_where_its_own_error_is_small_and_only_at_a_look() {
+    fn a_pixel_ends_only_at_a_check_with_a_small_error() {
         let alternating =
             |count: usize| pixel(&(0..count).map(|i| if i % 2 == 0 { 0.9 } else { 1.1 }).collect::<Vec<_>>());
         // 16 samples that are 0.1 off: an error of 0.1 / sqrt(15), raised by half for caution; the empty expectation

@@ -94,11 +94,11 @@ pub fn render_from(
     progress: &dyn Progress,
     cancel: &CancelToken,
     state: Option<RenderState>,
-    keeper: Option<&CheckpointSink<'_>>,
+    sink: Option<&CheckpointSink<'_>>,
 ) -> Result<(Rendered, RenderState), RenderError> {
     let start = Instant::now();
     let bounds = options.bounds()?;
-    let taker = PixelSampler::new(scene, options, integrator)?;
+    let pixel_sampler = PixelSampler::new(scene, options, integrator)?;
     let spp = options.stop.spp.max(1);
     let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
     let extras = Extras {
@@ -110,14 +110,17 @@ pub fn render_from(
             FilmKind::Spectral(buckets) => Some(buckets),
             FilmKind::Rgb | FilmKind::GBuffer(_) => None,
         },
-        depth_unit: depth_unit(scene, &taker.view),
+        depth_unit: depth_unit(scene, &pixel_sampler.view),
     };
-    let mut owners = match state {
-        Some(state) => owners_of(state, bounds, extras, options.first_sample)?,
+    let mut tiles = match state {
+        Some(state) => tiles_of(state, bounds, extras, options.first_sample)?,
         None => bounds.tiles(TILE).into_iter().map(|tile| TileState::new(Tile::new(tile, extras))).collect(),
     };
-    let before =
-        owners.iter().flat_map(|owner| owner.tile.pixels()).map(|pixel| u64::from(pixel.taken)).sum();
+    let before = tiles
+        .iter()
+        .flat_map(|tile_state| tile_state.tile.pixels())
+        .map(|pixel| u64::from(pixel.taken))
+        .sum();
     let workers = Workers::start(options.threads);
     let deadline = options.stop.time.and_then(|time| start.checked_add(time));
     let adaptive = match options.stop.noise {
@@ -129,68 +132,73 @@ pub fn render_from(
     };
     let job = Job {
         options,
-        taker,
+        pixel_sampler,
         pixels: bounds.area(),
         adaptive,
         deadline,
         cancel,
-        pause: keeper.map(|keeper| Pause::new(start, keeper.every)),
+        pause: sink.map(|sink| Pause::new(start, sink.every)),
         clock: Clock::new(start, start.elapsed(), bounds.area(), options.stop, before, progress),
         waves: Mutex::default(),
     };
-    let expect_quiet = |owners: &[TileState]| {
+    let expect_quiet = |tiles: &[TileState]| {
         let Some(adaptive) = &job.adaptive else { return };
-        let pixels = owners.iter().flat_map(|owner| owner.tile.bounds().pixels().zip(owner.tile.pixels()));
+        let pixels = tiles
+            .iter()
+            .flat_map(|tile_state| tile_state.tile.bounds().pixels().zip(tile_state.tile.pixels()));
         let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
         job.clock.expect_quiet_at(expected / bounds.area() as f64);
     };
-    expect_quiet(&owners);
-    let hand_over = |owners: &[TileState]| {
-        if let (Some(keeper), Some(pause)) = (keeper, &job.pause) {
-            (keeper.keep)(state_of(owners.to_vec(), bounds, options));
+    expect_quiet(&tiles);
+    let hand_over = |tiles: &[TileState]| {
+        if let (Some(sink), Some(pause)) = (sink, &job.pause) {
+            (sink.keep)(state_of(tiles.to_vec(), bounds, options));
             pause.start_again();
         }
     };
-    let least_wanted = |owners: &[TileState]| {
-        owners.iter().filter_map(|owner| adaptive::least_wanted(&owner.tile, job.adaptive.as_ref())).min()
+    let least_wanted = |tiles: &[TileState]| {
+        tiles
+            .iter()
+            .filter_map(|tile_state| adaptive::least_wanted(&tile_state.tile, job.adaptive.as_ref()))
+            .min()
     };
     // Considers pixels that need more.
-    let has = |owners: &[TileState], samples| least_wanted(owners).is_none_or(|least| least >= samples);
+    let has = |tiles: &[TileState], samples| least_wanted(tiles).is_none_or(|least| least >= samples);
 
     let mut stride = None;
     let mut last = None;
-    if least_taken(&owners) >= 1 {
+    if least_taken(&tiles) >= 1 {
         stride = Some(1);
     } else {
         for side in STRIDES {
             loop {
-                workers.for_each(&mut owners, |owner| {
-                    job.run_coarsely(owner, (bounds.x0, bounds.y0), side, last)
+                workers.for_each(&mut tiles, |tile_state| {
+                    job.run_coarsely(tile_state, (bounds.x0, bounds.y0), side, last)
                 });
-                if job.must_stop_at(side) || owners.iter().all(|owner| owner.next_side <= side) {
+                if job.must_stop_at(side) || tiles.iter().all(|tile_state| tile_state.next_side <= side) {
                     break;
                 }
-                hand_over(&owners);
+                hand_over(&tiles);
             }
             last = Some(side);
-            if owners.iter().any(|owner| owner.next_side > side) {
+            if tiles.iter().any(|tile_state| tile_state.next_side > side) {
                 break;
             }
             stride = Some(side);
         }
     }
     // The earlier run has reported its own samples.
-    let mut done = if before > 0 { least_wanted(&owners).unwrap_or(spp).min(spp) } else { 0 };
+    let mut done = if before > 0 { least_wanted(&tiles).unwrap_or(spp).min(spp) } else { 0 };
     while done < spp && stride == Some(1) {
         let end = next_count(done).min(spp);
         loop {
-            workers.for_each(&mut owners, |owner| job.run(owner, end));
-            if job.must_stop() || has(&owners, end) {
+            workers.for_each(&mut tiles, |tile_state| job.run(tile_state, end));
+            if job.must_stop() || has(&tiles, end) {
                 break;
             }
-            hand_over(&owners);
+            hand_over(&tiles);
         }
-        if !has(&owners, end) {
+        if !has(&tiles, end) {
             break;
         }
         done = end;
@@ -198,15 +206,15 @@ pub fn render_from(
             // The rest takes time for a large picture.
             break;
         }
-        let tiles = || owners.iter().map(|owner| &owner.tile);
+        let tiles = || tiles.iter().map(|tile_state| &tile_state.tile);
         let reached = noise(tiles(), bounds, job.adaptive.as_ref());
         progress.pass(&Snapshot {
             spp: done,
             noise: reached,
             picture: &|| picture(tiles(), bounds, options.transparent),
         });
-        expect_quiet(&owners);
-        if job.must_stop() || least_wanted(&owners).is_none() {
+        expect_quiet(&tiles);
+        if job.must_stop() || least_wanted(&tiles).is_none() {
             break;
         }
     }
@@ -215,9 +223,9 @@ pub fn render_from(
         return Err(RenderError::Unwanted);
     }
     progress.stopped(stride);
-    let spread = stride.filter(|side| *side > 1).map(|side| spread(&owners, bounds, side));
-    let is_done = has(&owners, spp);
-    let state = state_of(owners, bounds, options);
+    let spread = stride.filter(|side| *side > 1).map(|side| spread(&tiles, bounds, side));
+    let is_done = has(&tiles, spp);
+    let state = state_of(tiles, bounds, options);
     let shown = spread.as_ref().unwrap_or(&state.tiles);
     let rendered = rendered_of(shown.iter(), bounds, options.transparent, extras);
     let stats = Stats {
@@ -241,8 +249,8 @@ pub fn render_from(
 }
 
 /// The samples of the pixel with the fewest.
-fn least_taken(owners: &[TileState]) -> u32 {
-    owners.iter().map(|owner| owner.tile.least_taken()).min().unwrap_or(0)
+fn least_taken(tiles: &[TileState]) -> u32 {
+    tiles.iter().map(|tile_state| tile_state.tile.least_taken()).min().unwrap_or(0)
 }
 
 /// The sample count at which a render next checks its noise and shows its progress: the same after any interruptions.
@@ -270,7 +278,7 @@ fn depth_unit(scene: &Scene, view: &View) -> f64 {
 }
 
 /// The owners of a state's tiles.
-fn owners_of(
+fn tiles_of(
     state: RenderState,
     bounds: PixelBounds,
     extras: Extras,
@@ -288,12 +296,13 @@ fn owners_of(
     // Tiles of a render that continues in the same process are moved, not copied: they may take gigabytes.
     let are_in_place = state.tiles.iter().map(Tile::bounds).eq(places.iter().copied());
     let tiles = if are_in_place { state.tiles } else { placed(state.tiles, &places, extras) };
-    let mut owners: Vec<TileState> = tiles.into_iter().map(TileState::new).collect();
-    if let Some(owner) = owners.first_mut() {
-        (owner.record.counts, owner.dropped, owner.clamped) = (state.rays, state.dropped, state.clamped);
-        owner.first_dropped = state.first_dropped;
+    let mut tiles: Vec<TileState> = tiles.into_iter().map(TileState::new).collect();
+    if let Some(tile_state) = tiles.first_mut() {
+        (tile_state.record.counts, tile_state.dropped, tile_state.clamped) =
+            (state.rays, state.dropped, state.clamped);
+        tile_state.first_dropped = state.first_dropped;
     }
-    Ok(owners)
+    Ok(tiles)
 }
 
 /// Moves the sums of tiles into others, which are in rows from above. Each source is dropped as soon as everything is
@@ -314,12 +323,12 @@ fn placed(tiles: Vec<Tile>, places: &[PixelBounds], extras: Extras) -> Vec<Tile>
 }
 
 /// The state of all tiles.
-fn state_of(owners: Vec<TileState>, bounds: PixelBounds, options: &RenderOptions) -> RenderState {
+fn state_of(tiles: Vec<TileState>, bounds: PixelBounds, options: &RenderOptions) -> RenderState {
     let mut rays = RayCounts::default();
     let mut first_dropped: Vec<DroppedSample> = Vec::new();
-    for owner in &owners {
-        rays += owner.record.counts;
-        first_dropped.extend(&owner.first_dropped);
+    for tile_state in &tiles {
+        rays += tile_state.record.counts;
+        first_dropped.extend(&tile_state.first_dropped);
     }
     first_dropped.sort_unstable_by_key(|d| (d.sample, d.y, d.x));
     first_dropped.truncate(REMEMBERED);
@@ -329,17 +338,17 @@ fn state_of(owners: Vec<TileState>, bounds: PixelBounds, options: &RenderOptions
         bounds,
         pieces: vec![Piece { bounds, samples: first..first.saturating_add(wanted) }],
         rays,
-        dropped: owners.iter().map(|owner| owner.dropped).sum(),
-        clamped: owners.iter().map(|owner| owner.clamped).sum(),
+        dropped: tiles.iter().map(|tile_state| tile_state.dropped).sum(),
+        clamped: tiles.iter().map(|tile_state| tile_state.clamped).sum(),
         first_dropped,
-        tiles: owners.into_iter().map(|owner| owner.tile).collect(),
+        tiles: tiles.into_iter().map(|tile_state| tile_state.tile).collect(),
     }
 }
 
 /// The tiles; each pixel without a sample has that of its square of `side` by `side` pixels.
-fn spread(owners: &[TileState], bounds: PixelBounds, side: u32) -> Vec<Tile> {
+fn spread(tiles: &[TileState], bounds: PixelBounds, side: u32) -> Vec<Tile> {
     let columns = bounds.width().div_ceil(TILE) as usize;
-    let mut tiles: Vec<Tile> = owners.iter().map(|owner| owner.tile.clone()).collect();
+    let mut tiles: Vec<Tile> = tiles.iter().map(|tile_state| tile_state.tile.clone()).collect();
     if side > TILE {
         let step = (side / TILE) as usize;
         let corners: Vec<Tile> = tiles.iter().map(Tile::corner).collect();
@@ -355,7 +364,7 @@ fn spread(owners: &[TileState], bounds: PixelBounds, side: u32) -> Vec<Tile> {
 /// Shared, constant data of all tiles.
 struct Job<'a> {
     options: &'a RenderOptions,
-    taker: PixelSampler<'a>,
+    pixel_sampler: PixelSampler<'a>,
     pixels: u64,
     /// When a pixel has enough samples; `None` to take the same number everywhere.
     adaptive: Option<Adaptive>,
@@ -438,30 +447,32 @@ impl Job<'_> {
 
     /// Takes the first sample of the first pixel of each square of `side` by `side` pixels in the tile, counted from
     /// the corner of the picture, unless the last side's squares have it.
-    fn run_coarsely(&self, owner: &mut TileState, corner: (u32, u32), side: u32, last: Option<u32>) {
+    fn run_coarsely(&self, tile_state: &mut TileState, corner: (u32, u32), side: u32, last: Option<u32>) {
         let starts = |x: u32, y: u32, side: u32| {
             (x - corner.0).is_multiple_of(side) && (y - corner.1).is_multiple_of(side)
         };
         let is_new = |x, y| starts(x, y, side) && !last.is_some_and(|last| starts(x, y, last));
-        if self.take(owner, 0..1, is_new, || self.must_stop_at(side)) {
-            owner.next_side = side;
+        if self.take(tile_state, 0..1, is_new, || self.must_stop_at(side)) {
+            tile_state.next_side = side;
         }
     }
 
     /// Takes the samples of every pixel of a tile up to this number. A wave takes the same sample numbers of all
     /// pixels, so that an interrupted tile has all of one sample before any of the next.
-    fn run(&self, owner: &mut TileState, end: u32) {
+    fn run(&self, tile_state: &mut TileState, end: u32) {
         let may_stop = self.deadline.is_some() || self.pause.is_some();
         let most = if may_stop { WAVE_BY_THE_CLOCK } else { WAVE };
-        let Some(mut first) = adaptive::least_wanted(&owner.tile, self.adaptive.as_ref()) else { return };
+        let Some(mut first) = adaptive::least_wanted(&tile_state.tile, self.adaptive.as_ref()) else {
+            return;
+        };
         while first < end {
-            let wanting = adaptive::wanting(&owner.tile, self.adaptive.as_ref()).count();
+            let wanting = adaptive::wanting(&tile_state.tile, self.adaptive.as_ref()).count();
             let step = (most / wanting.max(1)).max(1) as u32;
             let mut next = first.saturating_add(step).min(end);
             if let Some(adaptive) = &self.adaptive {
                 next = next.min(adaptive.next_look(first));
             }
-            if !self.take(owner, first..next, |_, _| true, || self.must_stop()) {
+            if !self.take(tile_state, first..next, |_, _| true, || self.must_stop()) {
                 return;
             }
             first = next;
@@ -471,15 +482,15 @@ impl Job<'_> {
     /// Takes these sample numbers in the pixels of a tile that lack and need them; false if it had to stop first.
     fn take(
         &self,
-        owner: &mut TileState,
+        tile_state: &mut TileState,
         numbers: Range<u32>,
         is_wanted: impl Fn(u32, u32) -> bool,
         must_stop: impl Fn() -> bool,
     ) -> bool {
         let mut ids = Vec::new();
         for number in numbers {
-            for (x, y) in owner.tile.bounds().pixels() {
-                let pixel = owner.tile.pixel(x, y);
+            for (x, y) in tile_state.tile.bounds().pixels() {
+                let pixel = tile_state.tile.pixel(x, y);
                 let has_enough =
                     || self.adaptive.as_ref().is_some_and(|adaptive| adaptive.is_done(x, y, pixel));
                 if pixel.taken <= number && is_wanted(x, y) && !has_enough() {
@@ -491,16 +502,16 @@ impl Job<'_> {
             return true;
         }
         // Makes progress even if pauses are frequent.
-        if must_stop() || (owner.has_worked && self.is_paused()) {
-            owner.has_worked = false;
+        if must_stop() || (tile_state.has_worked && self.is_paused()) {
+            tile_state.has_worked = false;
             return false;
         }
-        owner.has_worked = true;
-        let rays = owner.record.counts.total();
+        tile_state.has_worked = true;
+        let rays = tile_state.record.counts.total();
         let mut wave = self.waves.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
-        let TileState { tile, record, dropped, clamped, first_dropped, .. } = owner;
+        let TileState { tile, record, dropped, clamped, first_dropped, .. } = tile_state;
         let exposure = self.options.sample_exposure();
-        self.taker.take(&mut wave, &ids, record, |SampleId { x, y, index }, sample| {
+        self.pixel_sampler.take(&mut wave, &ids, record, |SampleId { x, y, index }, sample| {
             match tile.add(x, y, &sample, &exposure) {
                 Addition::Whole => {}
                 Addition::Clamped => *clamped += 1,
@@ -513,7 +524,7 @@ impl Job<'_> {
             }
         });
         self.waves.lock().unwrap_or_else(PoisonError::into_inner).push(wave);
-        self.clock.add(ids.len() as u64, owner.record.counts.total() - rays);
+        self.clock.add(ids.len() as u64, tile_state.record.counts.total() - rays);
         true
     }
 }

@@ -12,7 +12,7 @@
 //!
 //! | stage | file | what it does |
 //! |---|---|---|
-//! | generate | `one_sample.rs`, `wave/sights.rs` | a camera ray for each sample, and what it hits |
+//! | generate | `one_sample.rs`, `wave/primary_hits.rs` | a camera ray for each sample, and what it hits |
 //! | catch | `wave/catcher.rs` | camera rays that hit a shadow catcher: samples of its lights, and whether they are blocked |
 //! | search | `wave/search.rs` | the closest hits of all rays, by the kernel |
 //! | media | `wave/media.rs` | absorption, emission and scattering between surfaces |

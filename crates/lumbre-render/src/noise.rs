@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn light_that_few_pixels_have_met_counts_as_much_as_where_all_have() {
+    fn light_that_few_pixels_met_counts_like_light_of_all() {
         for (n, share) in [(64, 0.25), (16, 0.01), (16, 0.001), (32, 3e-4)] {
             let bright = 0.1 + 1.0 / share;
             // The mean is 1.1, and the variance is (bright - 0.1)² pq.
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn the_edge_of_a_lamp_beside_the_dark_is_not_taken_for_rare_light() {
+    fn the_edge_of_a_lamp_is_not_rare_light() {
         // The left column is half covered by a lamp of 30; all else is 0.1, without noise.
         let bounds = PixelBounds::whole(64, 48);
         let mut tile = Tile::new(bounds, Extras::default());

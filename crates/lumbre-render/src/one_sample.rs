@@ -113,39 +113,39 @@ impl<'a> PixelSampler<'a> {
         record: &mut Record,
         mut put: impl FnMut(SampleId, Sample),
     ) {
-        let mut sights = self.start(wave, ids);
+        let mut primary_hits = self.start(wave, ids);
         // Of the filter and of the lens.
         let mut weights = Vec::with_capacity(ids.len());
         match &self.pinhole {
             Some(pinhole) => {
                 for (slot, &id) in ids.iter().enumerate() {
-                    let aim = self.aim(id, sights.aim(slot), None);
+                    let aim = self.aim(id, primary_hits.aim(slot), None);
                     weights.push((aim.weight, 1.0));
-                    sights.set_film(slot, aim.film, aim.time);
+                    primary_hits.set_film(slot, aim.film, aim.time);
                 }
-                sights.look_through(pinhole, self.has_footprints.then_some(SPACING));
+                primary_hits.look_through(pinhole, self.has_footprints.then_some(SPACING));
             }
             None => {
                 for (slot, &id) in ids.iter().enumerate() {
-                    let aim = self.aim(id, sights.aim(slot), Some(&sights.draw(slot)));
+                    let aim = self.aim(id, primary_hits.aim(slot), Some(&primary_hits.numbers(slot)));
                     let camera = self.camera_ray(&aim);
                     weights.push((aim.weight, camera.weight));
-                    sights.set_ray(slot, &camera);
+                    primary_hits.set_ray(slot, &camera);
                 }
             }
         }
-        sights.search(record);
-        let seen = self.see(&mut sights, record);
+        primary_hits.search(record);
+        let seen = self.see(&mut primary_hits, record);
         for (slot, ((&id, &(weight, passes)), &radiance)) in
-            ids.iter().zip(&weights).zip(sights.radiance()).enumerate()
+            ids.iter().zip(&weights).zip(primary_hits.radiance()).enumerate()
         {
             let SeenSample { mut caught, mut features, mut surface, covered } =
                 seen.get(slot).copied().unwrap_or_default();
             if passes == 0.0 {
                 (caught, features, surface) = (None, None, None);
             }
-            let spectrum = self.spectrum(sights.wavelengths(slot), radiance, caught.as_ref(), passes);
-            let radiance = match (sights.wavelengths(slot), &self.sensor_curves) {
+            let spectrum = self.spectrum(primary_hits.wavelengths(slot), radiance, caught.as_ref(), passes);
+            let radiance = match (primary_hits.wavelengths(slot), &self.sensor_curves) {
                 (None, _) => radiance,
                 (Some(wavelengths), None) => wavelengths.rec709(radiance),
                 (Some(wavelengths), Some(sensor)) => wavelengths.recorded(radiance, sensor),
@@ -176,8 +176,8 @@ impl<'a> PixelSampler<'a> {
 
     /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features;
     /// nothing where no sample has any of both.
-    fn see(&self, sights: &mut PrimaryHits<'_, 'a>, record: &mut Record) -> Vec<SeenSample> {
-        sights.show_background(self.lights_are_seen);
+    fn see(&self, primary_hits: &mut PrimaryHits<'_, 'a>, record: &mut Record) -> Vec<SeenSample> {
+        primary_hits.show_background(self.lights_are_seen);
         let has_catcher = self.scene.ground().is_some_and(|ground| ground.catcher);
         let mut seen = Vec::new();
         let space = match self.film {
@@ -186,15 +186,15 @@ impl<'a> PixelSampler<'a> {
         };
         let wants_surfaces = self.wants_features || space.is_some();
         if wants_surfaces || has_catcher || !self.lights_are_seen {
-            seen.resize(sights.len(), SeenSample::default());
+            seen.resize(primary_hits.len(), SeenSample::default());
             let mut places = Places::default();
-            sights.retain(|sights, slot| {
-                let is_caught = has_catcher && sights.is_on_ground(slot);
+            primary_hits.retain(|primary_hits, slot| {
+                let is_caught = has_catcher && primary_hits.is_on_ground(slot);
                 if is_caught
                     && let Some(catcher) = &self.catcher
-                    && let Some(surface) = sights.surface(slot)
+                    && let Some(surface) = primary_hits.surface(slot)
                 {
-                    let ray = sights.ray(slot);
+                    let ray = primary_hits.ray(slot);
                     places.push(slot, surface.point, surface.offset_origin(-ray.direction));
                     if self.wants_features {
                         let features = Features::of_ground(&self.view, catcher.ground(), &ray, &surface);
@@ -209,55 +209,58 @@ impl<'a> PixelSampler<'a> {
                             uv: surface.uv.as_vec2(),
                             albedo: ground.albedo,
                         };
-                        let camera = sights.camera(slot);
+                        let camera = primary_hits.camera(slot);
                         seen[slot].surface =
                             Some(SurfaceSample::of(&self.view, space, &camera, &at, SPACING));
                     }
                     return false;
                 }
-                let is_plain = if sights.is_miss(slot) { self.lights_are_seen } else { !wants_surfaces };
+                let is_plain =
+                    if primary_hits.is_miss(slot) { self.lights_are_seen } else { !wants_surfaces };
                 if is_plain && !is_caught {
                     return true;
                 }
-                let sight = sights.sight(slot);
-                let draw = sights.draw(slot);
-                let features = if self.wants_features { Features::of(&self.view, &sight) } else { None };
-                let surface = space.zip(sight.met.as_ref()).map(|(space, met)| {
+                let primary_hit = primary_hits.primary_hit(slot);
+                let numbers = primary_hits.numbers(slot);
+                let features =
+                    if self.wants_features { Features::of(&self.view, &primary_hit) } else { None };
+                let surface = space.zip(primary_hit.met.as_ref()).map(|(space, met)| {
                     let at = surface_point(met);
-                    SurfaceSample::of(&self.view, space, &sight.ray, &at, SPACING)
+                    SurfaceSample::of(&self.view, space, &primary_hit.ray, &at, SPACING)
                 });
-                let left = self.left_by_media(&sight, &draw);
+                let left = self.left_by_media(&primary_hit, &numbers);
                 let features = features.map(|features| feature_sample(features.behind(left)));
-                if sight.met.is_none() && left != Spectrum::WHITE && !self.lights_are_seen {
+                if primary_hit.met.is_none() && left != Spectrum::WHITE && !self.lights_are_seen {
                     // What is seen is the medium alone.
                     seen[slot] =
                         SeenSample { caught: None, features, surface, covered: Some(Spectrum::WHITE - left) };
                     return true;
                 }
-                let caught = caught(self.scene, &sight, &draw, self.lights_are_seen, record);
+                let caught = caught(self.scene, &primary_hit, &numbers, self.lights_are_seen, record);
                 seen[slot] = SeenSample { caught, features, surface, covered: None };
                 caught.is_none()
             });
             if let Some(catcher) = &self.catcher {
                 let kind = self.sampler.kind();
-                let caught = sights.catch(catcher, &mut places, kind, self.lights_are_seen, record);
+                let caught = primary_hits.catch(catcher, &mut places, kind, self.lights_are_seen, record);
                 for (&slot, caught) in places.slots.iter().zip(caught) {
                     seen[slot as usize].caught = Some(caught);
                 }
             }
         }
-        self.integrator.estimate(sights, &self.sampler, record);
+        self.integrator.estimate(primary_hits, &self.sampler, record);
         seen
     }
 
     /// An estimate of what media leave of the light of what a camera sees.
-    fn left_by_media(&self, sight: &PrimaryHit<'_>, draw: &SampleNumbers) -> Spectrum {
+    fn left_by_media(&self, primary_hit: &PrimaryHit<'_>, numbers: &SampleNumbers) -> Spectrum {
         if !self.scene.has_media() {
             return Spectrum::WHITE;
         }
-        let ray = sight.ray.ray;
-        let end = sight.met.as_ref().map_or(f64::INFINITY, |met| (met.surface.point - ray.origin).length());
-        self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), draw.along(&ray), None)
+        let ray = primary_hit.ray.ray;
+        let end =
+            primary_hit.met.as_ref().map_or(f64::INFINITY, |met| (met.surface.point - ray.origin).length());
+        self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), numbers.along(&ray), None)
     }
 
     /// Takes up samples.
@@ -266,11 +269,11 @@ impl<'a> PixelSampler<'a> {
     }
 
     /// Where a sample looks, by the numbers of [`SampleNumbers::aim`]. A lens without width has no point but its middle.
-    fn aim(&self, id: SampleId, [u, v, part, _]: [f32; 4], draw: Option<&SampleNumbers>) -> Aim {
+    fn aim(&self, id: SampleId, [u, v, part, _]: [f32; 4], numbers: Option<&SampleNumbers>) -> Aim {
         let place = self.filter.sample(DVec2::new(u.into(), v.into()));
         let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
         let offset = if self.is_centred { DVec2::ZERO } else { place.offset };
-        let lens = draw.filter(|_| self.view.has_lens()).map_or(DVec2::splat(0.5), SampleNumbers::lens);
+        let lens = numbers.filter(|_| self.view.has_lens()).map_or(DVec2::splat(0.5), SampleNumbers::lens);
         let time = self.view.time(if self.moves { part.into() } else { 0.0 });
         Aim { film: pixel + offset, lens, time, weight: place.weight }
     }
@@ -285,23 +288,23 @@ impl<'a> PixelSampler<'a> {
 
     /// A sample with all that leads to it.
     fn explain(&self, id: SampleId) -> ExplainedSample {
-        let draw = self.sampler.draw(id.x, id.y, id.index);
-        let aim = self.aim(id, draw.aim(), Some(&draw));
+        let numbers = self.sampler.numbers(id.x, id.y, id.index);
+        let aim = self.aim(id, numbers.aim(), Some(&numbers));
         let camera = self.camera_ray(&aim);
-        let (ray, radiance, events) = self.explain_sight(id, &camera);
+        let (ray, radiance, events) = self.explain_camera_ray(id, &camera);
         let radiance = through_lens(radiance, camera.weight);
         ExplainedSample { film: aim.film, lens: aim.lens, ray, radiance, weight: aim.weight, events }
     }
 
     /// The light along a ray with the numbers of a sample, and what happens along its path.
-    fn explain_sight(&self, id: SampleId, camera: &CameraRay) -> (Ray, Spectrum, Vec<Event>) {
+    fn explain_camera_ray(&self, id: SampleId, camera: &CameraRay) -> (Ray, Spectrum, Vec<Event>) {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
-        let mut sights = self.start(&mut wave, &[id]);
-        sights.set_ray(0, camera);
-        sights.search(&mut record);
-        let ray = sights.ray(0);
-        let seen = self.see(&mut sights, &mut record).first().and_then(|seen| seen.caught);
-        let radiance = seen.map_or(sights.radiance()[0], |seen| seen.radiance);
+        let mut primary_hits = self.start(&mut wave, &[id]);
+        primary_hits.set_ray(0, camera);
+        primary_hits.search(&mut record);
+        let ray = primary_hits.ray(0);
+        let seen = self.see(&mut primary_hits, &mut record).first().and_then(|seen| seen.caught);
+        let radiance = seen.map_or(primary_hits.radiance()[0], |seen| seen.radiance);
         (ray, radiance, record.journal.unwrap_or_default())
     }
 }
@@ -390,8 +393,8 @@ pub fn explain_sample(
     index: u32,
 ) -> Result<ExplainedSample, RenderError> {
     let integrator = integrator(&options.integrator);
-    let taker = PixelSampler::new(scene, options, &*integrator)?;
-    Ok(taker.explain(SampleId { x, y, index }))
+    let pixel_sampler = PixelSampler::new(scene, options, &*integrator)?;
+    Ok(pixel_sampler.explain(SampleId { x, y, index }))
 }
 
 /// An estimate of the light that arrives along a ray, as the render would make it, with all that happens along its path. The number
@@ -406,9 +409,9 @@ pub fn explain_ray(
     index: u32,
 ) -> Result<(Spectrum, Vec<Event>), RenderError> {
     let integrator = integrator(&options.integrator);
-    let taker = PixelSampler::new(scene, options, &*integrator)?;
+    let pixel_sampler = PixelSampler::new(scene, options, &*integrator)?;
     let camera = CameraRay { ray: *ray, footprint: Footprint::Point, weight: 1.0 };
     // With the random numbers of a pixel.
-    let (_, radiance, events) = taker.explain_sight(SampleId { x: 0, y: 0, index }, &camera);
+    let (_, radiance, events) = pixel_sampler.explain_camera_ray(SampleId { x: 0, y: 0, index }, &camera);
     Ok((radiance, events))
 }

@@ -61,7 +61,7 @@ impl Trial {
             FilmKind::Rgb | FilmKind::GBuffer(_) => FilmKind::Rgb,
         };
         let small = RenderOptions { features: false, guides: false, film, ..options.smaller(longer_side) };
-        let taker = PixelSampler::new(scene, &small, integrator)?;
+        let pixel_sampler = PixelSampler::new(scene, &small, integrator)?;
         let row = |y| Row { y, pixels: vec![Moments::default(); small.width as usize] };
         let mut rows: Vec<Row> = (0..small.height).map(row).collect();
         let start = Instant::now();
@@ -82,7 +82,7 @@ impl Trial {
                         (0..small.width).flat_map(|x| (first..first + SPP).map(move |index| (x, index)));
                     let ids: Vec<SampleId> =
                         samples.map(|(x, index)| SampleId { x, y: row.y, index }).collect();
-                    taker.take(&mut wave, &ids, &mut Record::default(), |id, sample| {
+                    pixel_sampler.take(&mut wave, &ids, &mut Record::default(), |id, sample| {
                         let luminance =
                             f64::from(small.sample_exposure().colour(sample.radiance).luminance());
                         if luminance.is_finite() {

@@ -68,7 +68,7 @@ fn by_photons(desc: SceneDesc, spp: u32) -> f64 {
 }
 
 #[test]
-fn a_lamp_in_the_middle_of_a_ball_of_glass_shines_as_it_does_without() {
+fn a_lamp_at_the_centre_of_a_glass_ball_is_undimmed() {
     let at = DVec3::new(0.3, 0.1, 3.0);
     let desc = floor(vec![lamp(at)]);
     let ball = with(desc.clone(), glass(1.5), Sphere::new(at, 0.5).unwrap());
@@ -90,7 +90,7 @@ fn a_mirror_shines_as_a_lamp_behind_it_does() {
 }
 
 #[test]
-fn a_slab_of_stained_glass_leaves_what_the_series_of_its_reflections_does() {
+fn a_stained_slab_transmits_its_reflection_series() {
     let down = |irradiance| LightDesc::Distant { towards: DVec3::Z, irradiance: Rgb::splat(irradiance) };
     let left: f32 = 0.7;
     let slab = Material::new(MaterialKind::Principled(Box::new(PrincipledParams {
@@ -151,7 +151,7 @@ fn what_paths_find_in_fog_photons_and_paths_find_together() {
 }
 
 #[test]
-fn a_lamp_in_a_small_ball_of_glass_shines_into_fog_as_it_does_without() {
+fn a_lamp_in_a_glass_ball_lights_fog_undimmed() {
     let at = DVec3::new(0.3, 0.1, 2.0);
     let mut bare = in_fog(floor(vec![lamp(at)]));
     // The fog alone scatters: the floor is black. The lamp is beside the picture.

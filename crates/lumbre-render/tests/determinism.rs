@@ -168,10 +168,10 @@ impl RayIntegrator for Broken {
         _: &Scene,
         _: &View,
         _: PrimaryHit<'_>,
-        draw: &SampleNumbers,
+        numbers: &SampleNumbers,
         _: &mut Record,
     ) -> Spectrum {
-        if draw.lobe(7) < 1.0 / 97.0 {
+        if numbers.lobe(7) < 1.0 / 97.0 {
             let count = self.0.fetch_add(1, Ordering::Relaxed);
             Spectrum::new(1.0, if count.is_multiple_of(2) { f32::NAN } else { f32::INFINITY }, 1.0)
         } else {
@@ -193,7 +193,7 @@ fn samples_that_are_no_numbers_are_dropped_counted_and_named() {
     assert!(rendered.image.pixels().iter().all(|&c| c == Rgb::splat(0.25)));
     let first = rendered.stats.first_dropped[0];
     let sampler = lumbre_render::transport::Sampler::new(&options.sampler);
-    assert!(sampler.draw(first.x, first.y, first.sample).lobe(7) < 1.0 / 97.0);
+    assert!(sampler.numbers(first.x, first.y, first.sample).lobe(7) < 1.0 / 97.0);
 }
 
 /// Finite light that is brighter than a sum of samples holds.
@@ -214,7 +214,7 @@ impl RayIntegrator for Blinding {
 }
 
 #[test]
-fn samples_that_are_too_bright_are_clamped_and_counted_under_their_own_name() {
+fn too_bright_samples_are_clamped_and_counted() {
     let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
     let options = options(&scene, 40, 30, 4);
     let rendered = render_with(&scene, &options, &Blinding, &NoProgress, &CancelToken::new()).unwrap();
@@ -357,7 +357,7 @@ fn options_that_make_no_picture_are_refused() {
 }
 
 #[test]
-fn an_instanced_light_is_as_bright_as_a_plain_one_and_found_by_chance_where_it_is_nested() {
+fn instanced_lights_are_as_bright_as_plain_ones() {
     let lamp = || ShapeDesc {
         area_light: Some(glow(3.0)),
         ..{
@@ -426,7 +426,7 @@ impl RayIntegrator for Interrupting {
 }
 
 #[test]
-fn a_render_that_is_stopped_in_its_first_pass_is_a_whole_coarse_picture() {
+fn a_render_stopped_in_its_first_pass_is_coarse_but_whole() {
     let scene = Scene::build(still_life(DVec3::ZERO)).unwrap();
     // Some tiles are narrower than others, and none begins at zero.
     let mut options = options(&scene, 700, 500, 4);

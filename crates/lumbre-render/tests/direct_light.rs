@@ -129,7 +129,7 @@ fn distant_light_falls_by_the_cosine() {
 }
 
 #[test]
-fn a_sphere_a_disk_and_a_rectangle_shine_as_their_form_factors_say() {
+fn area_lights_match_their_form_factors() {
     let up = over_floor();
     let sphere = Sphere::new(up.point(DVec3::new(2.0, 1.0, 4.0)), 1.75).unwrap();
     let sphere_expected = 5.0 * PI * 1.75_f64.powi(2) * 4.0 / 21_f64.powf(1.5);
@@ -207,7 +207,7 @@ fn an_environment_lights_as_its_integral_says() {
 }
 
 #[test]
-fn a_sun_in_an_environment_is_found_and_points_where_its_pixel_is() {
+fn a_sun_in_an_environment_points_where_its_pixel_is() {
     // One bright pixel over black: the distribution finds it, and the interpolation around it.
     let mut image = Image::filled(256, 256, Rgb::BLACK);
     let (x, y) = (160_u32, 85_u32);

@@ -141,7 +141,7 @@ fn what_absorbs_nothing_cannot_be_seen_in_a_white_room() {
 
 /// White Lambert as far as it is opaque, and what goes straight on for the rest.
 #[test]
-fn a_half_opaque_uber_that_absorbs_nothing_cannot_be_seen_in_a_white_room() {
+fn a_lossless_uber_vanishes_in_a_white_room() {
     let grey = |c: f32| Arc::new(SpectrumTexture::Constant(Rgb::splat(c)));
     let [kd, ks, kr, kt, opacity] = [1.0, 0.0, 0.0, 0.0, 0.375].map(grey);
     let eta = Arc::new(FloatTexture::Constant(1.5));

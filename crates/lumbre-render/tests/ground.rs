@@ -72,7 +72,7 @@ fn hidden() -> f64 {
 }
 
 #[test]
-fn a_shadow_under_an_even_sky_is_the_view_factor_of_what_hides_it() {
+fn shadows_under_an_even_sky_are_view_factors() {
     let (colour, alpha) = look(hovering(vec![sky(Rgb::new(2.0, 3.0, 4.0))], true), true);
     assert_eq!(colour, Rgb::BLACK);
     assert!((f64::from(alpha) / hidden() - 1.0).abs() < 0.01, "{alpha} {}", hidden());
@@ -159,7 +159,7 @@ fn a_pane_takes_from_the_light_what_it_reflects() {
 }
 
 #[test]
-fn glass_that_bends_light_takes_as_much_as_geometric_optics_says() {
+fn refracting_glass_blocks_light_as_optics_predicts() {
     let middle = HEIGHT + RADIUS;
     let ball = exact(Sphere::new(DVec3::new(3.0, 4.0 + middle, -2.0), RADIUS).unwrap());
     let kind = MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() };

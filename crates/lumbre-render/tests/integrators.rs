@@ -60,7 +60,7 @@ fn feature_integrators_show_what_they_are_called() {
 }
 
 #[test]
-fn whitted_follows_mirrors_to_what_is_lit_and_gives_no_second_bounce() {
+fn whitted_follows_mirrors_without_a_second_bounce() {
     // A mirror at 45° looks at a floor under a point light.
     let mut desc = floor();
     let mirror = Material::new(MaterialKind::ConductorReflectance {
@@ -96,7 +96,7 @@ fn whitted_follows_mirrors_to_what_is_lit_and_gives_no_second_bounce() {
 }
 
 #[test]
-fn whitted_counts_every_material_of_a_mixture_and_both_ways_of_glass_in_every_sample() {
+fn whitted_counts_all_of_mixtures_and_both_ways_of_glass() {
     let sky = |radiance: f32| LightDesc::Infinite {
         world_from_light: Transform::IDENTITY,
         radiance: Rgb::splat(radiance),

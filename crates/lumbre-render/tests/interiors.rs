@@ -199,7 +199,7 @@ fn by_paths(desc: SceneDesc, camera: Camera, side: u32, spp: u32) -> [f64; 3] {
 }
 
 #[test]
-fn a_solid_that_scatters_and_takes_nothing_cannot_be_seen_under_a_white_sky() {
+fn a_lossless_scattering_solid_vanishes_under_a_white_sky() {
     for (ior, depth, g) in [(1.0, 2.0, 0.0), (1.5, 3.0, 0.6), (1.3, 9.0, -0.4)] {
         let mut desc = in_the_open();
         let cloud = add_material(&mut desc, cloudy(ior, Rgb::WHITE, depth, g));

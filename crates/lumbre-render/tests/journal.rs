@@ -24,7 +24,7 @@ fn bits(light: Spectrum) -> [u32; 3] {
 }
 
 #[test]
-fn the_journal_of_a_sample_with_photons_sums_to_the_pixel_of_the_render() {
+fn a_journal_with_photons_sums_to_the_pixel() {
     let mut desc = still_life(DVec3::ZERO);
     desc.lights.push(LightDesc::Point { from: DVec3::new(0.5, -2.0, 5.0), intensity: Rgb::splat(40.0) });
     let scene = Scene::build(desc).unwrap();

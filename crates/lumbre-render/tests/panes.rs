@@ -331,7 +331,7 @@ fn light_of_the_sky_is_counted_once_beside_that_of_a_lamp() {
 }
 
 #[test]
-fn a_pane_that_is_made_rough_for_the_sake_of_noise_is_gone_through_once() {
+fn a_regularized_pane_is_crossed_once() {
     let mut desc = floor(vec![lamp()]);
     // The floor lies in the shadow of a small pane, whose surroundings are open.
     add_pane(&mut desc, 0.5 * LAMP, DVec3::Z, principled(clear(1.0, Rgb::WHITE)));
@@ -344,7 +344,7 @@ fn a_pane_that_is_made_rough_for_the_sake_of_noise_is_gone_through_once() {
 }
 
 #[test]
-fn pictures_through_panes_do_not_depend_on_the_number_of_threads() {
+fn pictures_through_panes_ignore_the_thread_count() {
     let mut desc = floor(vec![lamp()]);
     add_pane(&mut desc, 0.5 * LAMP, DVec3::Z, principled(clear(1.5, STAIN)));
     let up = over_floor();

@@ -38,10 +38,10 @@ fn run(
     scene: &Scene,
     options: &RenderOptions,
     state: Option<RenderState>,
-    keeper: Option<&CheckpointSink<'_>>,
+    sink: Option<&CheckpointSink<'_>>,
 ) -> Result<(Rendered, RenderState), RenderError> {
     let integrator = integrator(&options.integrator);
-    render_from(scene, options, &*integrator, &NoProgress, &CancelToken::new(), state, keeper)
+    render_from(scene, options, &*integrator, &NoProgress, &CancelToken::new(), state, sink)
 }
 
 fn assert_same(a: &Rendered, b: &Rendered, what: &str) {
@@ -68,12 +68,12 @@ fn a_render_goes_on_from_any_state_to_the_same_picture() {
         let states = RefCell::new(Vec::new());
         // Without a pause between two looks: a state of every wave, also from the first, coarse pass.
         let keep = |state: RenderState| states.borrow_mut().push(bytes_of(&state));
-        let keeper = CheckpointSink { every: Duration::ZERO, keep: &keep };
+        let sink = CheckpointSink { every: Duration::ZERO, keep: &keep };
         let mut slow = options.clone();
         slow.threads = 1;
         (slow.width, slow.height, slow.stop.spp) = (12, 9, 200);
         let small = run(scene, &slow, None, None).unwrap();
-        let kept = run(scene, &slow, None, Some(&keeper)).unwrap();
+        let kept = run(scene, &slow, None, Some(&sink)).unwrap();
         assert_same(&kept.0, &small.0, "with hand-overs");
         let states = states.into_inner();
         assert!(states.len() > 20, "{}", states.len());

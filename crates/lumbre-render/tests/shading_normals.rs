@@ -62,7 +62,7 @@ fn by_shading_normal(normal: f64, light: f64, distance: f64, viewer: f64) -> f64
 }
 
 #[test]
-fn pbrt_lights_a_lambert_face_by_the_cosine_to_its_shading_normal() {
+fn pbrt_uses_the_cosine_to_the_shading_normal() {
     // Degrees of the normal, of the light, its distance, degrees of the viewer, and whether both ways agree.
     let cases = [
         ("leaning towards the light", 35.0, 50.0, 3.0, 10.0, true),
@@ -92,7 +92,7 @@ fn pbrt_lights_a_lambert_face_by_the_cosine_to_its_shading_normal() {
 }
 
 #[test]
-fn the_light_that_a_path_finds_under_a_face_is_the_light_that_is_sampled() {
+fn hit_and_sampled_light_below_a_face_agree() {
     // A wide lamp, half of it under the plane of the face: found by sampling it and by the BSDF alike, to the closed form of a
     // furnace about the shading normal: a white sky gives the reflectance, whatever the geometric normal.
     let mut desc = leaning(35.0, 60.0, 3.0, 10.0);
@@ -123,7 +123,7 @@ fn differing(a: &Image, b: &Image) -> usize {
 }
 
 #[test]
-fn flat_meshes_and_exact_shapes_are_the_same_both_ways_and_smooth_ones_are_not() {
+fn only_smooth_meshes_differ_between_the_two_ways() {
     let sphere = || GeometryDesc::Exact(Sphere::new(CENTER, RADIUS).unwrap().into());
     for (name, ball, same) in
         [("flat", globe(6, false), true), ("exact", sphere(), true), ("smooth", globe(6, true), false)]
@@ -147,7 +147,7 @@ fn flat_meshes_and_exact_shapes_are_the_same_both_ways_and_smooth_ones_are_not()
 }
 
 #[test]
-fn a_coarse_smooth_sphere_keeps_its_polygonal_terminator_in_pbrt_s_way() {
+fn pbrt_mode_keeps_the_polygonal_terminator() {
     let exact = GeometryDesc::Exact(Sphere::new(CENTER, RADIUS).unwrap().into());
     let expected = shown(lit(exact), KINDS[0], ShadingNormals::Pbrt, 16);
     let [ours, pbrt] = WAYS.map(|way| {

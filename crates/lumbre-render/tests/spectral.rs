@@ -85,7 +85,7 @@ fn a_coloured_room_multiplies_spectra_and_not_colours() {
 }
 
 #[test]
-fn spectra_of_surfaces_and_of_lights_are_those_at_the_wavelengths() {
+fn spectra_are_evaluated_at_the_wavelengths() {
     let ramp = SpectrumValue::Sampled(vec![(360.0, 0.1), (830.0, 0.7)]);
     let lamp = SpectrumValue::Named(NamedSpectrum::from_name("stdillum-F11").unwrap());
     let material = Material::new(MaterialKind::Diffuse {
@@ -117,7 +117,7 @@ fn floor(light: LightDesc) -> SceneDesc {
 }
 
 #[test]
-fn light_that_bounces_once_has_the_colour_that_paths_of_colours_give_it() {
+fn single_bounces_match_the_colour_of_rgb_paths() {
     let white = Rgb::splat(3.0);
     let lights = [
         LightDesc::Point { from: DVec3::new(0.5, 1.0, 3.5), intensity: white },
@@ -161,7 +161,7 @@ fn a_medium_takes_its_share_at_each_wavelength() {
 }
 
 #[test]
-fn a_ball_of_glass_that_disperses_is_invisible_before_a_white_sky() {
+fn a_dispersive_glass_ball_vanishes_under_a_white_sky() {
     let glass = NamedSpectrum::from_name("glass-F11").unwrap();
     let mut desc = empty();
     let mut material = Material::new(MaterialKind::Dielectric { eta: 1.78, roughness: Roughness::smooth() });

@@ -53,7 +53,7 @@ fn over(half: f64) -> Camera {
 }
 
 #[test]
-fn a_body_that_absorbs_nothing_cannot_be_seen_before_an_even_sky() {
+fn a_lossless_body_vanishes_under_an_even_sky() {
     // At two bounces: the reflection, and what comes through the body once.
     for (depth, sigma) in [(64, 0.7), (64, 6.0)] {
         let mut desc = empty();
@@ -82,7 +82,7 @@ fn deep(reflectance: Rgb) -> (SceneDesc, DVec3) {
 }
 
 #[test]
-fn a_deep_body_gives_back_the_share_that_is_asked_for_under_a_sky_and_under_a_distant_light() {
+fn a_deep_body_has_the_requested_albedo() {
     let reflectance = Rgb::new(0.2, 0.5, 0.8);
     let bare = f64::from(fresnel::dielectric(1.0, ETA));
     let (mut desc, top) = deep(reflectance);

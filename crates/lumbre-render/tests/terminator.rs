@@ -135,8 +135,15 @@ fn only_what_stands_for_something_that_bulges_out_rises() {
             let ray = Ray::new(from, along);
             let hit = scene.closest(&ray).unwrap();
             let met = scene.interaction(&ray, &hit, &Footprint::Point);
-            assert_eq!(met.has_terminator_offset(), met.risen(&scene).is_some(), "{name}");
-            heights.extend(met.risen(&scene).map(|risen| (risen - CENTER).length() / RADIUS - 1.0));
+            assert_eq!(
+                met.has_terminator_offset(),
+                met.unoccluded_terminator_origin(&scene).is_some(),
+                "{name}"
+            );
+            heights.extend(
+                met.unoccluded_terminator_origin(&scene)
+                    .map(|origin| (origin - CENTER).length() / RADIUS - 1.0),
+            );
         }
         // A little above the sphere itself, by no more than the face is below it.
         let sag = 1.0 - (PI / 16.0).cos().powi(2);

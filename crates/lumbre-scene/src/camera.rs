@@ -550,7 +550,7 @@ mod tests {
     const MIDDLE: DVec2 = DVec2::new(0.5, 0.5);
 
     #[test]
-    fn cameras_by_eye_and_target_show_a_right_handed_world_unmirrored() {
+    fn look_at_cameras_do_not_mirror_right_handed_worlds() {
         let (eye, target, up) = (DVec3::new(3.0, -8.0, 2.0), DVec3::new(3.0, 5.0, 2.0), DVec3::Z);
         let size = DVec2::new(400.0, 200.0);
         let cameras = [

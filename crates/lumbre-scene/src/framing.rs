@@ -448,7 +448,7 @@ mod tests {
     }
 
     #[test]
-    fn azimuth_goes_to_the_right_and_elevation_up_by_so_many_degrees() {
+    fn azimuth_goes_right_and_elevation_up_in_degrees() {
         let points = box_points();
         let view = |azimuth, elevation| {
             let viewpoint = Viewpoint { azimuth, elevation, ..Viewpoint::default() };
@@ -475,7 +475,7 @@ mod tests {
     }
 
     #[test]
-    fn from_every_side_and_by_every_lens_everything_is_in_the_picture_and_fills_it() {
+    fn framing_fills_the_picture_from_every_side() {
         let points = box_points();
         for (azimuth, elevation, fov) in
             [(90.0, 0.0, 30.0), (-130.0, 50.0, 12.0), (20.0, 90.0, 100.0), (5.0, -80.0, 50.0)]

@@ -81,7 +81,7 @@ impl<'s> Interaction<'s> {
         self.leave_from(self.start(direction), direction)
     }
 
-    /// The ray that leaves along a unit direction from another origin, such as [`Interaction::risen`].
+    /// The ray that leaves along a unit direction from another origin, such as [`Interaction::unoccluded_terminator_origin`].
     pub fn leave_from(&self, start: DVec3, direction: DVec3) -> Ray {
         Ray::new(start, direction).at_time(self.time)
     }
@@ -105,13 +105,13 @@ impl<'s> Interaction<'s> {
     ///
     /// Rays that go below the plane of the face but not below the smooth surface leave from there, so that the
     /// face, which only approximates it, does not occlude them.
-    pub fn risen(&self, scene: &Scene) -> Option<DVec3> {
+    pub fn unoccluded_terminator_origin(&self, scene: &Scene) -> Option<DVec3> {
         let terminator_offset = self.terminator_offset?;
         let way = self.leave_from(self.incident_origin, terminator_offset).with_range(0.0, 1.0);
         (!scene.is_occluded(&way)).then(|| self.incident_origin + terminator_offset)
     }
 
-    /// [`Interaction::risen`] without the test for objects in between.
+    /// [`Interaction::unoccluded_terminator_origin`] without the test for objects in between.
     pub fn terminator_origin(&self) -> Option<DVec3> {
         Some(self.incident_origin + self.terminator_offset?)
     }

@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_is_cut_at_the_vertices_on_its_edges_and_knows_where_its_parts_are() {
+    fn triangles_are_split_at_vertices_on_their_edges() {
         // The edge from 0 to 1 has 3, 4 and 5 in between, by three triangles without area; that from 1 to 2 has 6, by one that
         // names the ends otherwise.
         let positions = [
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn meshes_without_seams_stay_as_they_are_and_so_do_those_with_too_many() {
+    fn meshes_without_or_with_too_many_seams_stay() {
         let positions = [[1.0, 2.0, 0.5], [9.0, 2.0, 0.5], [9.0, 6.0, 0.5], [5.0, 2.0, 0.5]].map(Vec3::from);
         // A point, a line there and back, and one whose long edge no other has.
         for flat in [[0, 0, 0], [0, 1, 1], [0, 3, 1]] {

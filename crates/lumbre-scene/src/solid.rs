@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn every_line_enters_as_often_as_it_leaves_even_through_edges_and_corners() {
+    fn lines_enter_as_often_as_they_leave() {
         let solid = MeshSolid::new(Arc::new(tetrahedron())).unwrap();
         let mesh = tetrahedron();
         let mut entered = 0;
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_through_the_middle_enters_and_leaves_where_the_faces_are() {
+    fn a_line_through_the_middle_hits_the_faces() {
         let solid = MeshSolid::new(Arc::new(tetrahedron())).unwrap();
         // Along x at y = 1, z = 1 of the mesh: x from 0 to 3 (1 - 1/4 - 1/5).
         let ray = Ray::new(DVec3::new(27.0, -2.0, 3.0), DVec3::new(-2.0, 0.0, 0.0));

@@ -106,7 +106,7 @@ pub enum StageLight {
     /// Studio light, and the rest of the description's.
     Studio,
     /// [`Surroundings::Map`] or [`Surroundings::Light`], and the rest of the description's lights.
-    Map,
+    Given,
 }
 
 /// The reflectance of the ground: that of light wood or concrete.
@@ -151,12 +151,12 @@ impl Stage {
             Surroundings::Map(map) => {
                 desc.lights.retain(|light| !matches!(light.bare(), LightDesc::Infinite { .. }));
                 desc.lights.push(around(desc.up, map));
-                StageLight::Map
+                StageLight::Given
             }
             Surroundings::Light(light) => {
                 desc.lights.retain(|light| !matches!(light, LightDesc::Infinite { .. }));
                 desc.lights.push(LightDesc::clone(light));
-                StageLight::Map
+                StageLight::Given
             }
             Surroundings::Studio => {
                 desc.lights.retain(|light| !matches!(light.bare(), LightDesc::Infinite { .. }));
@@ -171,9 +171,9 @@ impl Stage {
         // The build must add nothing more.
         desc.without_light = WithoutLight::Dark;
 
-        let is_shown_by_default = is_model && framed && light != StageLight::Own;
+        let casts_shadow_by_default = is_model && framed && light != StageLight::Own;
         let kind = match self.ground {
-            Ground::Automatic if is_shown_by_default => Ground::Shadow,
+            Ground::Automatic if casts_shadow_by_default => Ground::Shadow,
             Ground::Automatic => Ground::None,
             asked => asked,
         };
@@ -389,7 +389,7 @@ mod tests {
         let mut desc = SceneDesc { lights: vec![sky, lamp()], ..ball() };
         let surroundings = Surroundings::Map(map);
         let staged = Stage { surroundings, ..Stage::default() }.set(&mut desc);
-        assert_eq!(staged.light, StageLight::Map);
+        assert_eq!(staged.light, StageLight::Given);
         assert_eq!(desc.lights.len(), 2);
         assert!(matches!(desc.lights[0], LightDesc::Point { .. }));
         assert!(EnvironmentDesc::of_image(Arc::new(Image::filled(9, 4, Rgb::WHITE))).is_none());
@@ -467,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn another_up_axis_turns_the_ground_and_no_ground_is_added_over_the_camera() {
+    fn ground_follows_the_up_axis_and_stays_below_the_camera() {
         let up = Some(UpAxis::Z);
         let mut desc = ball();
         Stage { up, ..Stage::default() }.set(&mut desc);

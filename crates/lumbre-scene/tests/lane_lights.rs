@@ -345,7 +345,7 @@ fn the_light_of_samples_is_in_the_mean_that_of_scalar_code() {
 }
 
 #[test]
-fn what_leaves_the_scene_finds_the_sky_of_scalar_code_under_any_map() {
+fn escaping_rays_find_the_sky_of_scalar_code() {
     let mut random = RandomStream::new(34);
     let turned = Transform::rotate(DVec3::new(1.0, 2.0, 0.5), 40.0).unwrap();
     let stretched = turned * Transform::scale(DVec3::new(1e-3, -3e-3, 2e-3)).unwrap();

@@ -116,7 +116,7 @@ fn lambert(corners: &[DVec3], normal: DVec3) -> f64 {
 }
 
 #[test]
-fn a_rectangle_of_two_triangles_lights_as_lambert_says_from_near_and_far() {
+fn rectangles_of_triangles_match_lambert_near_and_far() {
     let mut random = RandomStream::new(12);
     for (case, distance) in [0.03, 0.3, 0.9, 2.0, 4.0, 15.0].into_iter().enumerate() {
         let (geometry, middle, normal, [a, b]) = rectangle_of_triangles(&mut random);
@@ -182,7 +182,7 @@ fn met_shadow(from: DVec3, sample: &LightSample) -> Ray {
 }
 
 #[test]
-fn what_is_sampled_of_a_sky_beside_other_ways_is_all_of_it_with_the_density_of_what_escapes() {
+fn sky_samples_for_mis_have_the_density_of_escaping_rays() {
     const SIDE: u32 = 300;
     let mut random = RandomStream::new(17);
     for mapping in [EnvironmentMapping::EqualArea, EnvironmentMapping::LatitudeLongitude] {
@@ -324,7 +324,7 @@ fn one_bright_texel_of_thousands_is_found_from_near_and_far() {
 }
 
 #[test]
-fn a_texel_that_is_not_finite_is_named_and_the_rest_of_the_sky_shines() {
+fn a_nan_texel_is_named_and_the_rest_of_the_sky_shines() {
     for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut pixels = vec![Rgb::splat(0.5); 16 * 8];
         pixels[5 * 16 + 9].b = wrong;

@@ -375,7 +375,7 @@ fn objects_that_are_not_placed_are_not_built() {
 }
 
 #[test]
-fn cut_outs_let_as_much_through_as_they_say_and_say_the_same_again() {
+fn cutouts_pass_their_share_deterministically() {
     let sheet = |alpha: FloatTexture| ShapeDesc {
         alpha: Some(Arc::new(alpha)),
         ..shape(0, GeometryDesc::Mesh(Arc::new(square())))
@@ -493,7 +493,7 @@ fn what_is_no_solid_cannot_be_combined() {
 }
 
 #[test]
-fn csg_shapes_within_csg_shapes_are_refused_only_when_they_are_very_deep() {
+fn nested_csg_is_refused_only_if_very_deep() {
     let nested = |depth: usize| {
         let ball = |x: f64| shape(1, exact(Sphere::new(DVec3::new(x, 2.0, 3.0), 2.0).unwrap()));
         let mut geometry = csg(CsgOperation::Union, vec![ball(0.0), ball(0.5)]);
@@ -591,7 +591,7 @@ fn a_description_with_a_light_or_a_camera_keeps_its_own() {
 }
 
 #[test]
-fn a_camera_looks_through_the_back_of_what_is_one_sided_and_light_does_not() {
+fn cameras_see_through_one_sided_backs_and_light_does_not() {
     let mut count = 0;
     for (mirrored, reverse) in [(false, false), (true, false), (false, true)] {
         let mut desc = SceneDesc::default();

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_is_reflected_beyond_the_critical_angle_and_at_grazing_incidence() {
+    fn fresnel_is_one_past_the_critical_angle_and_grazing() {
         let critical = (1.0 - 1.0 / (1.5_f32 * 1.5)).sqrt();
         assert_eq!(dielectric(-(critical - 1e-3), 1.5), 1.0);
         assert!(dielectric(-(critical + 1e-3), 1.5) < 1.0);

@@ -954,7 +954,7 @@ mod tests {
     }
 
     #[test]
-    fn a_normal_stays_on_its_side_and_a_map_that_says_nothing_changes_nothing() {
+    fn normals_stay_on_their_side_and_empty_maps_do_nothing() {
         let here = at(DVec3::ONE, Vec2::new(0.3, 0.6));
         let down = normal_map([0.6, 0.5, 0.0]).frame(&here, &surface());
         assert!(down.n.dot(surface().normal) > 0.0);

@@ -415,7 +415,7 @@ mod tests {
     }
 
     #[test]
-    fn between_texels_bilinear_is_linear_and_point_takes_the_nearest() {
+    fn bilinear_interpolates_and_point_takes_the_nearest() {
         let place = centre(2, 1).lerp(centre(3, 2), 0.25);
         assert_close(
             map(Wrap::Clamp, ImageFilter::Bilinear).lookup(place, NONE, NONE),
@@ -526,7 +526,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_is_the_coverage_where_there_is_one_and_the_mean_of_colours_otherwise() {
+    fn a_float_lookup_is_alpha_or_the_mean_colour() {
         let lookup = |channels: Channels, texel: &[u8]| {
             let data = PixelData::U8(texel.repeat(6));
             let bitmap = Bitmap::new(3, 2, channels, data, Encoding::Linear).unwrap();

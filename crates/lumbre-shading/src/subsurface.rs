@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reflectance_is_about_that_of_the_albedo_that_photon_beam_diffusion_gives() {
+    fn reflectance_matches_photon_beam_diffusion() {
         // Reflectances by that method, for an index of 1.33, of these albedos.
         for (albedo, reflectance) in [(0.8, 0.185_72), (0.9, 0.295_57), (0.95, 0.414_82), (0.99, 0.672_73)] {
             let inside = Inside::Reflectance {

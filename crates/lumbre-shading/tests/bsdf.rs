@@ -475,7 +475,7 @@ fn the_tail_of_chi_square_is_that_of_the_tables() {
 }
 
 #[test]
-fn sampling_follows_the_density_and_the_density_integrates_to_what_is_sampled() {
+fn samples_follow_the_density_and_it_integrates_to_one() {
     let list = all();
     let tests = (0..list.len()).map(|b| some_views(b).count()).sum::<usize>() as f64;
     // Šidák: all tests together fail by chance once in a thousand.
@@ -993,7 +993,7 @@ fn a_prism_bends_blue_more_than_red() {
 }
 
 #[test]
-fn directions_without_a_side_and_grazing_ones_give_finite_answers() {
+fn grazing_directions_give_finite_answers() {
     let odd: Vec<LocalDir> = [
         Vec3::X,
         Vec3::Z,
@@ -1146,7 +1146,7 @@ fn a_medium_without_base_scatters_as_its_phase_function_says() {
 }
 
 #[test]
-fn two_smooth_layers_are_a_mirror_and_their_bounces_the_geometric_series() {
+fn smooth_layers_reflect_the_geometric_series() {
     let metal = coated_metal((0.0, 0.0), (0.0, 0.0), 0.0);
     let mut endless = metal;
     (endless.coat.thickness, endless.coat.max_depth) = (0.2, 200);
@@ -1172,7 +1172,7 @@ fn two_smooth_layers_are_a_mirror_and_their_bounces_the_geometric_series() {
 }
 
 #[test]
-fn a_slightly_rough_coated_metal_reflects_as_much_as_a_smooth_one() {
+fn slightly_rough_coated_metal_is_as_bright_as_smooth() {
     for wo in [Vec3::new(0.1, 0.2, 0.9), Vec3::new(-0.5, 0.3, 0.6)].map(local) {
         let share = |coat, metal| {
             let bsdf = Bsdf::CoatedConductor(coated_metal((coat, coat), (metal, metal), 0.0));
@@ -1192,7 +1192,7 @@ fn a_bsdf_stays_small() {
 }
 
 #[test]
-fn regularizing_roughens_mirrors_and_leaves_rough_surfaces_alone() {
+fn regularizing_roughens_mirrors_only() {
     let Bsdf::Conductor(metal) = gold((0.0, 0.0)).regularized() else { unreachable!() };
     assert_eq!(metal.facets.alpha(), Vec2::splat(0.1));
     let Bsdf::Dielectric(rough) = glass(GLASS, (0.12, 0.25)).regularized() else { unreachable!() };

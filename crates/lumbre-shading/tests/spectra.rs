@@ -43,7 +43,7 @@ fn near(found: Spectrum, wanted: Spectrum, tolerance: f32) {
 }
 
 #[test]
-fn a_texture_has_its_spectrum_at_wavelengths_and_its_colour_without() {
+fn textures_have_a_spectrum_or_a_colour() {
     let colour = Spectrum::new(0.7, 0.4, 0.2);
     let data = PixelData::F32(colour.to_array().repeat(4));
     let bitmap = Bitmap::new(2, 2, Channels::Rgb, data, Encoding::Linear).unwrap();

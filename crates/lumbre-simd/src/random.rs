@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_uniform_and_neither_neighbours_nor_words_know_each_other() {
+    fn numbers_are_uniform_and_uncorrelated() {
         let count = 100_000_u32;
         let mut means = [0.0; 4];
         let mut products = [0.0; 5];

@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_is_moved_by_look_at_sees_what_one_made_there_sees() {
+    fn a_moved_camera_sees_what_one_made_there_sees() {
         let (eye, target) = (DVec3::new(7.0, -2.0, 3.0), DVec3::new(1.0, 2.0, 0.5));
         let expected = Camera::perspective(eye, target, DVec3::Z, 35.0).unwrap();
         let base = Camera::perspective(DVec3::new(0.0, 9.0, 1.0), DVec3::new(3.0, 0.0, 1.0), DVec3::Z, 50.0)

@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn a_token_works_once_the_session_always_and_anything_else_never() {
+    fn a_token_works_once_and_the_session_always() {
         let guard = guard();
         let token: Secret = guard.paths().next().unwrap().strip_prefix("/#").unwrap().parse().unwrap();
         let challenge = Secret::new().unwrap();

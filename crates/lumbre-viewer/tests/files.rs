@@ -3,7 +3,7 @@
 use crate::client::{Running, SCENE};
 
 #[test]
-fn a_saved_edit_is_read_and_a_broken_one_leaves_the_picture_with_its_place() {
+fn edits_are_read_and_broken_ones_keep_the_picture() {
     let viewer = Running::new();
     let mut socket = viewer.socket(&viewer.session());
     let done = |message: &serde_json::Value| message["doing"] == "done";
@@ -27,7 +27,7 @@ fn a_saved_edit_is_read_and_a_broken_one_leaves_the_picture_with_its_place() {
 }
 
 #[test]
-fn a_picture_for_which_there_is_no_memory_is_refused_and_a_smaller_one_goes_on() {
+fn a_picture_too_large_for_memory_is_refused() {
     let viewer = Running::new();
     let mut socket = viewer.socket(&viewer.session());
     socket.wait_for("progress", |message| message["doing"] == "done");

@@ -265,7 +265,7 @@ fn broken_requests_are_refused_and_slow_ones_given_up() {
 }
 
 #[test]
-fn files_that_are_dropped_are_of_a_bounded_size_and_come_by_tickets() {
+fn dropped_files_are_bounded_and_need_tickets() {
     let viewer = Running::new();
     let session = viewer.session();
     let own = [format!("Host: {}", viewer.host()), format!("Origin: http://{}", viewer.host())];
@@ -421,7 +421,7 @@ fn numbers_beyond_all_bounds_do_nothing() {
 }
 
 #[test]
-fn floods_are_ended_and_a_hundred_readers_who_read_nothing_hold_no_one_up() {
+fn floods_end_and_idle_readers_block_nobody() {
     let viewer = Running::new();
     let session = viewer.session();
     let mut flood = viewer.socket(&session);

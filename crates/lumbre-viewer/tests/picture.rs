@@ -27,7 +27,7 @@ fn finished(socket: &mut crate::client::Socket, sequence: u32) -> Vec<u8> {
 }
 
 #[test]
-fn the_last_frame_has_the_pixels_of_the_picture_that_is_rendered() {
+fn the_last_frame_has_the_pixels_of_the_render() {
     let viewer = Running::new();
     let mut socket = viewer.socket(&viewer.session());
     let frame = finished(&mut socket, 0);
@@ -82,7 +82,7 @@ fn a_page_asks_for_pixels_and_for_what_a_ray_meets() {
 }
 
 #[test]
-fn kinds_of_shapes_are_called_what_the_scene_language_calls_them() {
+fn shape_kinds_have_scene_language_names() {
     let viewer = Running::new();
     let mut socket = viewer.socket(&viewer.session());
     finished(&mut socket, 0);
@@ -104,7 +104,7 @@ fn kinds_of_shapes_are_called_what_the_scene_language_calls_them() {
 }
 
 #[test]
-fn a_pixel_of_the_picture_that_is_shown_is_explained_in_a_frame_that_runs_one_script() {
+fn a_shown_pixel_is_explained_in_a_sandboxed_frame() {
     let viewer = Running::new();
     let session = viewer.session();
     let mut socket = viewer.socket(&session);

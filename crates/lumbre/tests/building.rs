@@ -56,7 +56,7 @@ fn what_stands_to_the_right_is_to_the_right_in_the_picture() {
 }
 
 #[test]
-fn geometry_of_a_program_s_own_is_rendered_as_the_exact_shape_that_it_describes() {
+fn custom_geometry_renders_as_the_shape_it_describes() {
     let place = Transform::translate(CENTER) * Transform::scale(DVec3::new(1.5, 0.5, 1.0)).unwrap();
     let scene = |shape: ShapeBuilder| {
         SceneBuilder::new()
@@ -112,7 +112,7 @@ fn instances_stand_in_all_of_their_places_and_none_elsewhere() {
 }
 
 #[test]
-fn points_are_asked_for_what_is_nearest_and_whether_they_are_inside() {
+fn point_queries_give_nearest_and_inside() {
     let scene = SceneBuilder::new()
         .shape(ShapeBuilder::exact(Sphere::new(CENTER, 2.0).unwrap()))
         .shape(ShapeBuilder::exact(Sphere::new(CENTER + 10.0 * DVec3::X, 3.0).unwrap()))
@@ -155,7 +155,7 @@ fn a_light_of_custom_geometry_shines_and_cannot_shine_by_power() {
 }
 
 #[test]
-fn a_camera_is_replaced_and_the_picture_is_that_of_a_scene_made_with_it() {
+fn a_replaced_camera_gives_the_same_picture() {
     let ball = || {
         SceneBuilder::new().shape(ShapeBuilder::exact(Sphere::new(CENTER, 0.75).unwrap())).film(film(9, 7))
     };

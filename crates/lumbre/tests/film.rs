@@ -92,7 +92,7 @@ fn the_channels_of_a_plane_are_those_of_its_equation() {
 }
 
 #[test]
-fn a_film_with_channels_has_the_colours_of_one_without_and_any_threads_make_it() {
+fn films_with_channels_keep_colours_for_any_threads() {
     let plain = render(&scene(&plane("\"rgb\"")), 4, 2);
     let mut films = ["\"gbuffer\"", "\"gbuffer\" \"string coordinatesystem\" \"world\""]
         .map(|film| render(&scene(&plane(film)), 4, 2));

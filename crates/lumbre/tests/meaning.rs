@@ -221,7 +221,7 @@ fn around(folder: &TempDir, file: &str, turn: &str) -> [[f64; 3]; 6] {
 }
 
 #[test]
-fn latitude_longitude_maps_have_z_at_the_top_and_turn_from_x_to_y() {
+fn latitude_longitude_maps_have_z_up_and_turn_x_to_y() {
     // The left edge is towards +x, a quarter to the right +y, the middle -x.
     let map = painted(64, 32, |u, v| match ((8.0 * u).floor() as u32, v) {
         (_, v) if v < 0.2 => WHITE,
@@ -244,7 +244,7 @@ fn latitude_longitude_maps_have_z_at_the_top_and_turn_from_x_to_y() {
 }
 
 #[test]
-fn equal_area_maps_have_z_in_the_middle_and_minus_z_in_the_corners() {
+fn equal_area_maps_have_z_in_the_middle() {
     let map = painted(64, 64, |u, v| {
         let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
         match () {
@@ -275,7 +275,7 @@ fn equal_area_maps_have_z_in_the_middle_and_minus_z_in_the_corners() {
 }
 
 #[test]
-fn the_illuminance_of_an_environment_is_what_its_upper_half_gives_the_ground() {
+fn illuminance_is_that_of_the_upper_half_on_the_ground() {
     let bright_spot = |u: f64, v: f64| if (u - 0.4).abs() < 0.1 && v < 0.3 { WHITE } else { GREY };
     let folder = folder_with(&[
         ("wide.exr", painted(128, 64, bright_spot)),
@@ -308,7 +308,7 @@ fn on_square<const N: usize>(folder: Option<&Path>, before: &str, places: [[f64;
 }
 
 #[test]
-fn images_on_surfaces_have_their_lower_left_corner_at_the_origin_of_uv() {
+fn images_have_their_lower_left_corner_at_the_uv_origin() {
     let image = painted(2, 2, |u, v| match (u < 0.5, v < 0.5) {
         (true, true) => [0.75, 0.0, 0.0],
         (false, true) => [0.0, 0.75, 0.0],
@@ -431,7 +431,7 @@ fn normal_maps_and_displacements_tilt_what_light_falls_on() {
 }
 
 #[test]
-fn the_film_shows_its_part_of_the_picture_and_counts_its_exposure() {
+fn the_film_applies_its_crop_and_exposure() {
     let scene = |film: &str, camera: &str| {
         format!(
             r#"Film "rgb" "integer xresolution" 24 "integer yresolution" 16 {film}

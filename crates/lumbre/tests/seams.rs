@@ -42,7 +42,7 @@ fn aim(random: &mut RandomStream) -> (DVec3, DVec3) {
 }
 
 #[test]
-fn every_ray_that_leaves_through_a_stitched_edge_crosses_it_once() {
+fn rays_through_a_stitched_edge_cross_it_once() {
     // Three tenths of a step are rounded: there, the triangles have an area, and the surface may fold.
     for (stops, is_exact) in [(&[3.0][..], true), (&[1.0, 2.0, 7.0], true), (&[2.5, 3.3], false)] {
         let scene = scene(stitched(stops));

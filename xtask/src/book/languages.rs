@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn both_languages_have_the_same_headings_formulas_commands_and_exercises() {
+    fn both_languages_have_the_same_structure() {
         let pages = root().join(PAGES);
         let mut faults = Vec::new();
         let translated = translated();

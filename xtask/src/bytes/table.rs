@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_reads_back_and_keeps_other_programs_where_the_hash_stays() {
+    fn tables_read_back_and_keep_rows_of_other_programs() {
         let page = format!("text\n{START}{END}\nmore\n");
         let nothing = Kept::read(&page).unwrap();
         let folder = tempfile::tempdir().unwrap();

@@ -207,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn everything_that_the_program_is_made_of_has_a_licence_and_a_text() {
+    fn every_dependency_has_a_licence_with_its_text() {
         let dependencies = Dependencies::of(&["lumbre-cli"]).expect("the graph");
         let has = |name: &str| dependencies.packages.iter().any(|package| package.name == name);
         assert!(has("clap") && has("lumbre-kernel") && has("winapi-util"), "{dependencies:?}");

@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn the_time_to_an_error_lies_on_the_line_between_its_neighbours_on_logarithmic_axes() {
+    fn time_to_an_error_is_interpolated_logarithmically() {
         // From (2, 0.9) to (32, 0.09): a tenth of the error in sixteen times the time.
         let points = [point(0.5, 4.0), point(2.0, 0.9), point(32.0, 0.09)];
         let middle = time_to_error(&points, 0.9 / 10.0_f64.sqrt()).unwrap();

@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn the_relative_mse_is_the_mean_of_squares_over_those_of_the_reference() {
+    fn relative_mse_divides_by_reference_squares() {
         let reference = picture(&[[0.0, 0.3, 2.0], [0.7, 0.7, 0.7]]);
         let other = picture(&[[0.1, 0.5, 2.5], [0.7, 0.7, 0.7]]);
         // 0.01/0.01, 0.04/0.1 and 0.25/4.01 over six values.

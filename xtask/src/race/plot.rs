@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_axis_is_logarithmic_between_the_powers_of_ten_around_its_values() {
+    fn an_axis_is_logarithmic_between_powers_of_ten() {
         let axis = Axis::around([0.03, 7.0].into_iter(), [100.0, 400.0]);
         assert_eq!(axis.powers, [-2.0, 1.0]);
         for (value, place) in [(0.01, 100.0), (0.1, 200.0), (10.0_f64.sqrt(), 350.0), (10.0, 400.0)] {

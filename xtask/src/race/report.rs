@@ -293,7 +293,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_takes_the_place_of_the_last_one_and_nothing_else_changes() {
+    fn the_table_replaces_only_the_last_one() {
         let old = format!("# Race\nbefore\n{BEGIN}\nold\n{END}\nafter\n");
         let new = between_markers(&old, "new\n").unwrap();
         assert_eq!(new, format!("# Race\nbefore\n{BEGIN}\n\nnew\n\n{END}\nafter\n"));

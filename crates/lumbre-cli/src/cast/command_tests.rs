@@ -77,7 +77,7 @@ fn bytes(scene: &Scene, query: Query, form: Form, threads: usize, at_a_time: usi
 }
 
 #[test]
-fn every_number_of_threads_and_every_size_of_pieces_gives_the_same_bytes() {
+fn threads_and_piece_sizes_give_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene(folder.path());
     for query in QUERIES {
@@ -170,7 +170,7 @@ fn no_rays_have_no_answers() {
 }
 
 #[test]
-fn a_header_keeps_its_length_when_the_number_of_answers_is_known() {
+fn a_header_keeps_its_length_once_answers_are_counted() {
     for table in QUERIES.map(Query::table) {
         let descrs = table.arrays().into_iter().map(|(_, descr)| descr).chain([table.descr()]);
         for descr in descrs {

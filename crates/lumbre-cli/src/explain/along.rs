@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_zero_where_the_search_finds_a_crossing_and_changes_its_sign_there() {
+    fn the_function_changes_sign_at_each_crossing() {
         let mut random = RandomStream::new(11);
         for shape in shapes() {
             let mut roots = 0;

@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_replaced_where_they_are_and_added_where_they_are_not() {
+    fn numbers_are_replaced_or_added() {
         let text = r#"{"materials": [{ }, {"pbr": {"colour": [1, 2 , 3 ] , "rough":5},"n":1e3 }], "nodes":[{"x":[]}]}"#;
         let found = changed(
             text,

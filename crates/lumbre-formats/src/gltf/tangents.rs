@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fan_of_a_hundred_thousand_triangles_and_one_without_a_texture_get_theirs() {
+    fn large_fans_and_untextured_ones_get_tangents() {
         let count = 100_000_u32;
         let ring = |i: u32| {
             let (sin, cos) = (i as f32 / count as f32 * 6.0).sin_cos();

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn tga_bmp_qoi_and_webp_are_told_by_the_byte_where_reading_stopped() {
+    fn damage_of_images_is_reported_with_its_byte() {
         let (tga, bmp, webp) = (
             foreign(image::ImageFormat::Tga),
             foreign(image::ImageFormat::Bmp),

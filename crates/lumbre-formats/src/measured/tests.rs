@@ -91,7 +91,7 @@ fn read_bytes(bytes: &[u8]) -> Result<MeasuredTables> {
 }
 
 #[test]
-fn a_known_material_has_the_values_and_densities_of_another_reader() {
+fn a_known_material_matches_another_reader() {
     // The angles of view and of light in degrees, f at 550 nm, and the density, of both files.
     let expected = [
         ([0.0, 0.0], [40.0, 180.0], [0.110_358, 0.080_172_8], [0.190_73, 0.184_748]),

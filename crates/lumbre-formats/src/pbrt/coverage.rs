@@ -393,7 +393,7 @@ object. `ColorSpace` is that of `rgb` parameters; a film in another one than `sr
 `WorldEnd` are of pbrt-v3.\n";
 
 #[test]
-fn the_table_of_what_is_rendered_is_that_of_the_reader_and_nothing_lacks_a_reason() {
+fn the_coverage_table_is_that_of_the_reader() {
     let (text, without_reason) = page();
     assert_eq!(without_reason, [""; 0], "parameters without effect, and no reason for that");
     let path = docs().join("coverage.md");

@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn edges_become_short_without_cracks_and_vertices_move_along_their_normals() {
+    fn displacement_splits_edges_without_cracks() {
         let origin = DVec3::new(0.0, 0.0, 100.0);
         let moved = displacement(0.7).apply(&mesh(), origin, &Budget::default()).unwrap();
         // Each inner edge has two faces in opposite directions, each outer one lies on the outline.
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_displaced_is_refused_and_what_is_too_much_is_not_begun() {
+    fn impossible_and_huge_displacements_are_refused() {
         let refused = |mesh: &MeshDesc, edge: f64, limits| {
             displacement(edge).apply(mesh, DVec3::ZERO, &Budget::new(limits)).unwrap_err()
         };

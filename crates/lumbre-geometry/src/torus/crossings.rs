@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn the_way_down_to_the_first_crossing_ends_where_the_first_piece_does() {
+    fn the_descent_to_the_first_crossing_ends_in_time() {
         let (mut found, mut all) = (0, 0);
         for minor in [0.02, 0.25, 0.6, 0.95] {
             let ring = Torus::new(DVec3::ZERO, DVec3::Z, 1.0, minor).unwrap();

@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_horn_is_touched_at_its_point_and_a_spindle_crossed_on_both_sheets() {
+    fn horn_and_spindle_tori_have_all_crossings() {
         let horn = Torus::new(DVec3::ZERO, DVec3::Z, 1.0, 1.0).unwrap();
         agree(&hits(&horn, [-3.0, 0.0, 0.0], [1.0, 0.0, 0.0]), &[(1.0, 1), (3.0, 2), (5.0, 1)]);
         let spindle = Torus::new(DVec3::ZERO, DVec3::Z, 1.0, 2.0).unwrap();

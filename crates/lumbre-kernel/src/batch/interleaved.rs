@@ -10,7 +10,7 @@ use super::sink::Sink;
 use crate::intersect::STACK;
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::{self, Simd, Slots};
-use crate::simd::{self, F32x16, Vector, WIDE};
+use crate::simd::{self, F32x16, LANES, Vector};
 use crate::trace::decide::Decider;
 use crate::trace::stack::Goal;
 use crate::trace::{LaneHits, Outcome, Stop};
@@ -178,12 +178,12 @@ impl References {
         const LAST_TRIANGLES: i32 = tag::reference(tag::TRIANGLES, tag::PLACE) as i32;
         const BEFORE_DONE: i32 = DONE as i32 - 1;
         const { assert!(LAST_NODE > 0 && LAST_TRIANGLES > LAST_NODE && BEFORE_DONE < 0) };
-        let (rows, _) = self.0.as_chunks::<WIDE>();
+        let (rows, _) = self.0.as_chunks::<LANES>();
         let (mut leaves, mut others, mut negative, mut done) = (0, 0, 0, 0);
         for (i, row) in rows.iter().enumerate() {
             let row = W::load(bytemuck::cast_ref(row));
-            let above = |last: i32| u64::from(row.bits_above(last)) << (WIDE * i);
-            negative |= !above(-1) & 0xffff << (WIDE * i);
+            let above = |last: i32| u64::from(row.bits_above(last)) << (LANES * i);
+            negative |= !above(-1) & 0xffff << (LANES * i);
             leaves |= above(LAST_NODE);
             if GENERAL {
                 others |= above(LAST_TRIANGLES);

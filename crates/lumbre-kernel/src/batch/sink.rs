@@ -1,10 +1,10 @@
 //! Receives the answers of many rays.
 
-use crate::simd::WIDE;
+use crate::simd::LANES;
 use crate::trace::Outcome;
 
 /// Rays in a packet.
-pub(crate) const PACKET: usize = WIDE;
+pub(crate) const PACKET: usize = LANES;
 
 /// Takes the answers, in any order. Methods must be `#[inline(always)]`: an answer passed through memory would stall.
 pub(crate) trait Sink<A> {

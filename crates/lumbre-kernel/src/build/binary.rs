@@ -549,11 +549,11 @@ impl Builder<'_> {
             return None;
         }
         // A small spread means that the estimated range was much too wide: measure it instead.
-        if split.is_some_and(|split| split.spread > 4) {
+        if split.is_some_and(|split| split.occupied_bins > 4) {
             return split;
         }
         let centers = self.centers(primitives);
-        if centers.are_one() {
+        if centers.coincide() {
             return None;
         }
         self.binned::<COSTS>(primitives, Binning::new(&centers, primitives.len()), bins, depth)

@@ -4,7 +4,7 @@ use lumbre_geometry::Aabb;
 use lumbre_math::{AnimatedTransform, DMat3, DVec3, Transform};
 
 use crate::intersect::{Dispatch, Isa, Simd};
-use crate::simd::{F32x16, Row, WIDE};
+use crate::simd::{F32x16, LANES, Row};
 use crate::tree::Tree;
 use crate::tree::geometry::Placement;
 use crate::tree::node::{Node, TreeSpace, tag};
@@ -89,7 +89,7 @@ impl Outline {
         if !(f64::MIN_POSITIVE..f64::INFINITY).contains(&unit) {
             return Self::of_box(whole);
         }
-        let boxes = boxes.chunks(WIDE).map(|boxes| SixteenBoxes::new(boxes, center, unit)).collect();
+        let boxes = boxes.chunks(LANES).map(|boxes| SixteenBoxes::new(boxes, center, unit)).collect();
         Self { whole, center, unit, boxes, reach }
     }
 

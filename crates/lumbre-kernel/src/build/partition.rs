@@ -16,14 +16,14 @@ const PIECE: usize = 2048;
 pub(crate) fn part(isa: Isa, primitives: &mut [Primitive], split: &Split, is_shared: bool) {
     let count = primitives.len();
     let room = || vec![Bounds::EMPTY; PIECE.min(count)];
-    let part = |there: &mut Vec<Primitive>, primitives: &mut [Primitive]| {
-        isa.run(PartPiece { primitives, split, there })
+    let part = |buffer: &mut Vec<Primitive>, primitives: &mut [Primitive]| {
+        isa.run(PartPiece { primitives, split, buffer })
     };
     let lefts: Vec<usize> = if is_shared {
         primitives.par_chunks_mut(PIECE).with_min_len(4).map_init(room, part).collect()
     } else {
-        let mut there = room();
-        primitives.chunks_mut(PIECE).map(|piece| part(&mut there, piece)).collect()
+        let mut buffer = room();
+        primitives.chunks_mut(PIECE).map(|piece| part(&mut buffer, piece)).collect()
     };
     let pieces = lefts.iter().enumerate().map(|(piece, left)| {
         let start = piece * PIECE;

@@ -49,7 +49,7 @@ impl Centers {
         std::array::from_fn(|axis| (i64::from(self.high[axis]) - i64::from(self.low[axis])) as f32)
     }
 
-    pub(crate) fn are_one(&self) -> bool {
+    pub(crate) fn coincide(&self) -> bool {
         (0..3).all(|axis| self.low[axis] == self.high[axis])
     }
 
@@ -224,7 +224,7 @@ pub(crate) struct Split {
     /// The range of the centres on each side.
     centers: [Centers; 2],
     /// Bins that the centres occupy, on the axis where they occupy most.
-    pub(crate) spread: usize,
+    pub(crate) occupied_bins: usize,
 }
 
 impl Split {
@@ -260,13 +260,13 @@ impl<const COSTS: bool> Dispatch for BestSplit<'_, COSTS> {
         let last = binning.bins;
         let mut best = (f32::INFINITY, 0, 0);
         let mut occupied = [(0, 0); 3];
-        let mut spread = 0;
+        let mut occupied_bins = 0;
         for (axis, occupied) in occupied.iter_mut().enumerate() {
             let (bounds, counts, costs) = (&bins.bounds[axis], &bins.counts[axis], &bins.costs[axis]);
             let low = counts[..last].iter().position(|&count| count > 0)?;
             let high = counts[..last].iter().rposition(|&count| count > 0).unwrap_or(low);
             *occupied = (low, high);
-            spread = spread.max(high - low + 1);
+            occupied_bins = occupied_bins.max(high - low + 1);
 
             let mut right_costs = [0.0; MAX_BINS];
             let (mut right, mut count, mut cost) = (Bounds::EMPTY, 0, 0);
@@ -309,7 +309,7 @@ impl<const COSTS: bool> Dispatch for BestSplit<'_, COSTS> {
         centers[0].high[axis] = binning.edge(axis, bin, 0.01);
         centers[1].low[axis] = binning.edge(axis, bin, -0.01);
         let centers = [centers[0].within(&sides[0]), centers[1].within(&sides[1])];
-        Some(Split { binning, axis, bin, left, centers, spread })
+        Some(Split { binning, axis, bin, left, centers, occupied_bins })
     }
 }
 
@@ -401,11 +401,11 @@ impl Sides<'_> {
     }
 }
 
-/// Moves the primitives left of a split to the front and returns their number. `there` is a buffer for all of them.
+/// Moves the primitives left of a split to the front and returns their number. `buffer` is a buffer for all of them.
 pub(crate) struct PartPiece<'a> {
     pub(crate) primitives: &'a mut [Primitive],
     pub(crate) split: &'a Split,
-    pub(crate) there: &'a mut [Primitive],
+    pub(crate) buffer: &'a mut [Primitive],
 }
 
 impl Dispatch for PartPiece<'_> {
@@ -413,18 +413,18 @@ impl Dispatch for PartPiece<'_> {
 
     #[inline(always)]
     fn run<L: Simd>(self) -> usize {
-        let Self { primitives, split, there } = self;
+        let Self { primitives, split, buffer } = self;
         let (mut left, mut right) = (0, 0);
         for place in 0..primitives.len() {
             let primitive = primitives[place];
             let is_left = split.is_left(&primitive);
             // Branch-free: a wrong element is overwritten later.
             primitives[left] = primitive;
-            there[right] = primitive;
+            buffer[right] = primitive;
             left += usize::from(is_left);
             right += usize::from(!is_left);
         }
-        primitives[left..].copy_from_slice(&there[..right]);
+        primitives[left..].copy_from_slice(&buffer[..right]);
         left
     }
 }

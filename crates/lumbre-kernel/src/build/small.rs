@@ -19,7 +19,7 @@ pub(crate) enum SmallSplit {
 
 /// Whether they fit one leaf.
 #[inline(always)]
-fn is_uniform<const COSTS: bool>(primitives: &[Primitive], traits: &[Traits]) -> bool {
+fn fits_one_leaf<const COSTS: bool>(primitives: &[Primitive], traits: &[Traits]) -> bool {
     let group = |p: &Primitive| group_of(p, traits);
     let first = group(&primitives[0]);
     let most = match first.0 {
@@ -50,7 +50,7 @@ impl<const COSTS: bool> Dispatch for SplitSmall<'_, COSTS> {
     fn run<L: Simd>(self) -> SmallSplit {
         let Self { primitives, traits } = self;
         let count = primitives.len();
-        let could_be_leaf = is_uniform::<COSTS>(primitives, traits);
+        let could_be_leaf = fits_one_leaf::<COSTS>(primitives, traits);
         if could_be_leaf && (count == 1 || !COSTS) {
             return SmallSplit::Leaf;
         }

@@ -2,7 +2,7 @@
 
 use super::operations::Simd;
 use crate::intersect::watertight::HeightRange;
-use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
+use crate::simd::{F32x8, F32x16, LANES, Row, Vector};
 use crate::tree::BLOCK;
 use crate::tree::bounding_block::{
     BoundingBlock, BoundingVolumeRay, MIN_COMPONENT, MIN_TOLERANCE, MIN_TUBE_ERROR, TOLERANCE_PER_MARGIN,
@@ -152,10 +152,10 @@ struct SeenTube {
 
 /// The k of points on a chord: the middles of pieces of equal length.
 static MIDDLES: Row<f32> = {
-    let mut middles = [0.0; WIDE];
+    let mut middles = [0.0; LANES];
     let mut i = 0;
-    while i < WIDE {
-        middles[i] = (2 * i + 1) as f32 / WIDE as f32 - 1.0;
+    while i < LANES {
+        middles[i] = (2 * i + 1) as f32 / LANES as f32 - 1.0;
         i += 1;
     }
     Row(middles)
@@ -178,7 +178,7 @@ impl Chord {
         let error = TUBE_ERROR_PER_MARGIN * self.margin + MIN_TUBE_ERROR;
         // In the space of x, y and r z.
         let (pz, dz) = (tube * pz, tube * dz);
-        let half_piece = (dx * dx + dy * dy + dz * dz).sqrt() * ((1.0 + 1e-6) / WIDE as f32);
+        let half_piece = (dx * dx + dy * dy + dz * dz).sqrt() * ((1.0 + 1e-6) / LANES as f32);
         let splat = W::splat;
         let k = W::load(&MIDDLES.0);
         let x = k.mul_add(splat(dx), splat(px));

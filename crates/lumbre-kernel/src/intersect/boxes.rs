@@ -8,10 +8,10 @@ use super::slots::{PushSlots, Slots};
 use crate::intersect::box_ray::Slabs;
 use crate::intersect::box_ray::{Frustum, SlabRows};
 use crate::simd::vector::stack_entry;
-use crate::simd::{F32x16, WIDE};
+use crate::simd::{F32x16, LANES};
 use crate::tree::node::{Node, WIDTH};
 
-const _: () = assert!(WIDTH == WIDE);
+const _: () = assert!(WIDTH == LANES);
 
 /// The near planes of all children on an axis, and the far planes.
 #[inline(always)]
@@ -187,7 +187,7 @@ pub(crate) fn put_and_take_by_distance<W: F32x16>(
     let room = slots.room();
     match room.window.first_chunk_mut() {
         Some(four) if count <= 4 => {
-            if !enter.put_falling(mask, &node.children, four) {
+            if !enter.store_four_descending(mask, &node.children, four) {
                 return push_by_distance(node, mask, enter, room);
             }
         }

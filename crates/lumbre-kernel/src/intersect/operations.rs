@@ -10,7 +10,7 @@ use super::isa::Isa;
 use super::triangles::{Edges, Shears};
 use super::watertight::{BlockRay, EdgeTest, Inside, Shear};
 use crate::ray32::Ray32;
-use crate::simd::{F32x8, F32x16, LastEight, Row, Vector, WIDE, three_of_two};
+use crate::simd::{F32x8, F32x16, LANES, LastEight, Row, Vector, three_of_two};
 use crate::tree::filter_start::FilterStart;
 use crate::tree::node::TreeSpace;
 use crate::tree::triangle_block::TriangleBlock;
@@ -72,10 +72,10 @@ pub(crate) trait Simd {
     fn start_f32_blocks(start: &FilterStart, ray: &Ray32, slabs: &Slabs) -> F32Ray;
 
     /// The numbers of rays in single precision, transposed: origin, start, direction, end.
-    fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]);
+    fn f32_rows(rays: &[Ray32; LANES], rows: &mut [Row<f32>; 8]);
 
     /// The numbers of rays, transposed: origin, direction and range.
-    fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]);
+    fn columns(rays: &[Ray; LANES], columns: &mut [Row<f64>; 8]);
 
     /// The corners of a block's triangles in the ray's sheared space, `[x, y or z][corner]`: see [`Shears::apply`].
     /// Lanes without a triangle are undefined.

@@ -17,7 +17,7 @@ use crate::ray32::Ray32;
 #[cfg(target_arch = "aarch64")]
 use crate::simd::neon::Neon16;
 use crate::simd::portable::Portable16;
-use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
+use crate::simd::{F32x8, F32x16, LANES, Row, Vector};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
 use crate::tree::filter_start::FilterStart;
@@ -204,15 +204,15 @@ impl<W: EverywhereThere> Simd for Plain<W> {
         let rows = [kx, ky, kz].map(|axis| words[shared_row(axis)..].first_chunk().expect("sixteen"));
         let [x, y, z] = ray.apply(rows.map(W::load));
         for (corner, places) in block.corners().into_iter().enumerate() {
-            sheared[0][corner] = x.at_places(places);
-            sheared[1][corner] = y.at_places(places);
-            sheared[2][corner] = z.at_places(places);
+            sheared[0][corner] = x.swizzle(places);
+            sheared[1][corner] = y.swizzle(places);
+            sheared[2][corner] = z.swizzle(places);
         }
         sheared
     }
 
     #[inline]
-    fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
+    fn f32_rows(rays: &[Ray32; LANES], rows: &mut [Row<f32>; 8]) {
         for (i, ray) in rays.iter().enumerate() {
             for axis in 0..3 {
                 rows[axis].0[i] = ray.origin[axis];
@@ -223,7 +223,7 @@ impl<W: EverywhereThere> Simd for Plain<W> {
     }
 
     #[inline]
-    fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
+    fn columns(rays: &[Ray; LANES], columns: &mut [Row<f64>; 8]) {
         for (i, ray) in rays.iter().enumerate() {
             for axis in 0..3 {
                 columns[axis].0[i] = ray.origin[axis];

@@ -16,7 +16,7 @@ use super::slots::Slots;
 use super::triangles::Edges;
 use super::watertight::BlockRay;
 use crate::ray32::Ray32;
-use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
+use crate::simd::{F32x8, F32x16, LANES, Row, Vector};
 use crate::tree::filter_start::FilterStart;
 use crate::tree::node::{Node, WIDTH};
 use crate::tree::triangle_block::TriangleBlock;
@@ -121,13 +121,13 @@ type Entered = (u32, [f32; WIDTH]);
 pub(crate) fn intersect_each_at(
     isa: Isa,
     node: &Node,
-    rays: &[Slabs; WIDE],
+    rays: &[Slabs; LANES],
     alive: u32,
     children: u32,
-) -> (Entered, [Entered; WIDE]) {
-    struct Each<'a>(&'a Node, &'a [Slabs; WIDE], u32, u32);
+) -> (Entered, [Entered; LANES]) {
+    struct Each<'a>(&'a Node, &'a [Slabs; LANES], u32, u32);
     impl Dispatch for Each<'_> {
-        type Output = (Entered, [Entered; WIDE]);
+        type Output = (Entered, [Entered; LANES]);
         #[inline(always)]
         fn run<L: Simd>(self) -> Self::Output {
             let Self(node, rays, alive, children) = self;

@@ -12,7 +12,7 @@ use lumbre_geometry::{Ray, Root};
 use lumbre_math::{DVec2, DVec3};
 
 use super::axes::Axes;
-use crate::simd::{Row, WIDE};
+use crate::simd::{LANES, Row};
 use crate::tree::filter_start::MIN_SIZE;
 
 /// The shear that turns a ray's direction into the last axis; computed once per ray.
@@ -438,7 +438,7 @@ impl Pairs<'_> {
     #[inline(always)]
     pub(crate) fn meet(&self) -> Met {
         let mut met = Met::NONE;
-        for i in 0..WIDE {
+        for i in 0..LANES {
             let [x, y, z] = [self.direction[0].0[i], self.direction[1].0[i], self.direction[2].0[i]];
             let origin = [
                 self.origin[0].0[i] - self.mesh_origin[0],

@@ -9,7 +9,7 @@ pub(crate) mod vector;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod x86;
 
-pub(crate) use vector::{F32x8, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
+pub(crate) use vector::{F32x8, F32x16, LANE_BITS, LANES, LastEight, Row, Vector};
 
 /// Eight, and eight others, three times.
 #[inline(always)]

@@ -5,7 +5,7 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use bytemuck::Zeroable;
 
-use super::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
+use super::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, LANES, LastEight, Row, Vector};
 
 /// Instructions on registers.
 macro_rules! registers {
@@ -25,7 +25,7 @@ pub(crate) type Neon16 = NeonVector<4>;
 unsafe impl<const N: usize> Zeroable for NeonVector<N> {}
 
 /// The number of each lane, and its bit in a mask, by registers.
-static LANES: [[u32; 4]; 4] = [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 10, 11], [12, 13, 14, 15]];
+static LANE_NUMBERS: [[u32; 4]; 4] = [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 10, 11], [12, 13, 14, 15]];
 static BITS: [[u32; 4]; 4] =
     [[1, 2, 4, 8], [16, 32, 64, 128], [256, 512, 1024, 2048], [4096, 8192, 16_384, 32_768]];
 
@@ -283,7 +283,7 @@ impl F32x16 for Neon16 {
     }
 
     #[inline(always)]
-    fn load(row: &[f32; WIDE]) -> Self {
+    fn load(row: &[f32; LANES]) -> Self {
         Self::read(row)
     }
 
@@ -432,19 +432,19 @@ impl F32x16 for Neon16 {
         registers!({
             for i in 0..4 {
                 let kept = vbicq_u32(vreinterpretq_u32_f32(self.0[i]), vdupq_n_u32(LANE_BITS as u32));
-                self.0[i] = vreinterpretq_f32_u32(vorrq_u32(kept, four(&LANES[i])));
+                self.0[i] = vreinterpretq_f32_u32(vorrq_u32(kept, four(&LANE_NUMBERS[i])));
             }
             self
         })
     }
 
     #[inline(always)]
-    fn bits(self) -> [i32; WIDE] {
+    fn bits(self) -> [i32; LANES] {
         bytemuck::cast(self.to_array())
     }
 
     #[inline(always)]
-    fn at_places(self, places: u32) -> Neon8 {
+    fn swizzle(self, places: u32) -> Neon8 {
         registers!({
             let [a, b, c, d] = self.0;
             let [a, b] = [vreinterpretq_u8_f32(a), vreinterpretq_u8_f32(b)];
@@ -452,7 +452,7 @@ impl F32x16 for Neon16 {
             let mut eight = Neon8::splat(0.0);
             for i in 0..2 {
                 // Of four bits each: shifted to the right, which is to the left by less than nothing.
-                let shifts = vmulq_n_s32(vreinterpretq_s32_u32(four(&LANES[i])), -4);
+                let shifts = vmulq_n_s32(vreinterpretq_s32_u32(four(&LANE_NUMBERS[i])), -4);
                 let shifted = vshlq_u32(vdupq_n_u32(places), shifts);
                 let numbers = vandq_u32(shifted, vdupq_n_u32(LANE_BITS as u32));
                 // The four bytes of each.

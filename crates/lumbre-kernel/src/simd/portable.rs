@@ -4,12 +4,12 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use bytemuck::Zeroable;
 
-use super::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
+use super::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x8, F32x16, LANE_BITS, LANES, LastEight, Row, Vector};
 
 #[derive(Clone, Copy, Zeroable)]
 pub(crate) struct PortableVector<const N: usize>([f32; N]);
 pub(crate) type Portable8 = PortableVector<8>;
-pub(crate) type Portable16 = PortableVector<WIDE>;
+pub(crate) type Portable16 = PortableVector<LANES>;
 
 macro_rules! by_lane {
     ($name:ident, $trait:ident, $operator:tt) => {
@@ -144,7 +144,7 @@ impl F32x16 for Portable16 {
 
     #[inline(always)]
     fn of_two(first: Portable8, second: Portable8) -> Self {
-        let mut all = [0.0; WIDE];
+        let mut all = [0.0; LANES];
         for lane in 0..8 {
             (all[lane], all[8 + lane]) = (first.0[lane], second.0[lane]);
         }
@@ -166,7 +166,7 @@ impl F32x16 for Portable16 {
     }
 
     #[inline(always)]
-    fn load(row: &[f32; WIDE]) -> Self {
+    fn load(row: &[f32; LANES]) -> Self {
         Self(*row)
     }
 
@@ -177,7 +177,7 @@ impl F32x16 for Portable16 {
 
     #[inline(always)]
     fn rounded(row: &Row<f64>) -> Self {
-        let mut all = [0.0; WIDE];
+        let mut all = [0.0; LANES];
         for (one, exact) in all.iter_mut().zip(row.0) {
             *one = exact as f32;
         }
@@ -195,7 +195,7 @@ impl F32x16 for Portable16 {
 
     #[inline(always)]
     fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self {
-        let mut all = [0.0; WIDE];
+        let mut all = [0.0; LANES];
         for (one, exact) in all.iter_mut().zip(row.0) {
             *one = ((exact - place) * scale) as f32;
         }
@@ -212,8 +212,8 @@ impl F32x16 for Portable16 {
 
     #[inline(always)]
     fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self) {
-        let (mut rounded, mut rest) = ([0.0; WIDE], [0.0; WIDE]);
-        for lane in 0..WIDE {
+        let (mut rounded, mut rest) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
             let exact = row.0[lane] - place;
             rounded[lane] = exact as f32;
             rest[lane] = (exact - f64::from(rounded[lane])) as f32;
@@ -224,7 +224,7 @@ impl F32x16 for Portable16 {
     #[inline(always)]
     fn reduce_max(self) -> f32 {
         let mut most = self.0[0];
-        for lane in 1..WIDE {
+        for lane in 1..LANES {
             most = if self.0[lane] > most { self.0[lane] } else { most };
         }
         most
@@ -260,7 +260,7 @@ impl F32x16 for Portable16 {
 
     #[inline(always)]
     fn select(mask: u32, mut first: Self, second: Self) -> Self {
-        for lane in 0..WIDE {
+        for lane in 0..LANES {
             first.0[lane] = if mask >> lane & 1 != 0 { first.0[lane] } else { second.0[lane] };
         }
         first
@@ -269,7 +269,7 @@ impl F32x16 for Portable16 {
     #[inline(always)]
     fn bits_above(self, other: i32) -> u32 {
         let mut mask = 0;
-        for lane in 0..WIDE {
+        for lane in 0..LANES {
             mask |= u32::from(bits_of(self.0[lane]) > other) << lane;
         }
         mask
@@ -278,7 +278,7 @@ impl F32x16 for Portable16 {
     #[inline(always)]
     fn with_bits(self, bits: u32) -> u32 {
         let mut mask = 0;
-        for lane in 0..WIDE {
+        for lane in 0..LANES {
             mask |= u32::from(self.0[lane].to_bits() == bits) << lane;
         }
         mask
@@ -286,15 +286,15 @@ impl F32x16 for Portable16 {
 
     #[inline(always)]
     fn lanes_in_bits(mut self) -> Self {
-        for lane in 0..WIDE {
+        for lane in 0..LANES {
             self.0[lane] = f32::from_bits((bits_of(self.0[lane]) & !LANE_BITS | lane as i32) as u32);
         }
         self
     }
 
     #[inline(always)]
-    fn bits(self) -> [i32; WIDE] {
-        let mut bits = [0; WIDE];
+    fn bits(self) -> [i32; LANES] {
+        let mut bits = [0; LANES];
         for (bits, number) in bits.iter_mut().zip(self.0) {
             *bits = bits_of(number);
         }

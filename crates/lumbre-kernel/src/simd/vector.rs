@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 use super::opaque_number;
 
 /// Those that are sixteen.
-pub(crate) const WIDE: usize = 16;
+pub(crate) const LANES: usize = 16;
 
 /// The key of a distance in the upper half, a reference in the lower: entries order by distance.
 #[inline(always)]
@@ -19,12 +19,12 @@ pub(crate) fn stack_entry(key: i32, reference: u32) -> i64 {
 /// An array that can be loaded at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
-pub(crate) struct Row<T>(pub(crate) [T; WIDE]);
+pub(crate) struct Row<T>(pub(crate) [T; LANES]);
 
 impl<T: Copy> Row<T> {
     #[inline(always)]
     pub(crate) const fn of(value: T) -> Self {
-        Self([value; WIDE])
+        Self([value; LANES])
     }
 }
 
@@ -72,7 +72,7 @@ pub(crate) trait F32x8: Vector<Array = [f32; 8]> + Zeroable {
 }
 
 /// Sixteen.
-pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
+pub(crate) trait F32x16: Vector<Array = [f32; LANES]> + Zeroable {
     /// Eight of them.
     type Half: F32x8;
     /// Eight, and eight others.
@@ -81,7 +81,7 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     fn splat_two(first: f32, second: f32, last: LastEight) -> Self;
     /// The first eight, or the last: `which` is 0 or 1.
     fn half(&self, which: usize) -> Self::Half;
-    fn load(row: &[f32; WIDE]) -> Self;
+    fn load(row: &[f32; LANES]) -> Self;
     fn store(self, row: &mut Row<f32>);
     /// Rounded.
     fn rounded(row: &Row<f64>) -> Self;
@@ -127,27 +127,27 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     fn with_bits(self, bits: u32) -> u32;
     /// With each one's place in its last four bits.
     fn lanes_in_bits(self) -> Self;
-    fn bits(self) -> [i32; WIDE];
+    fn bits(self) -> [i32; LANES];
 
     /// Eight of them, each by its place, of four bits; the first in the lowest.
     #[inline(always)]
-    fn at_places(self, places: u32) -> Self::Half {
+    fn swizzle(self, places: u32) -> Self::Half {
         let all = self.to_array();
         let mut eight = [0.0; 8];
         for (lane, one) in eight.iter_mut().enumerate() {
-            *one = all[(places >> (4 * lane)) as usize % WIDE];
+            *one = all[(places >> (4 * lane)) as usize % LANES];
         }
         Self::Half::load(&eight)
     }
 
     /// Of the first four that the mask chooses, if there are as many, the bits above and the word in the same place below.
     #[inline(always)]
-    fn first_four(self, mask: u32, words: &[u32; WIDE]) -> [i64; 4] {
+    fn first_four(self, mask: u32, words: &[u32; LANES]) -> [i64; 4] {
         let bits = self.bits();
         let mut rest = mask;
         let mut four = [0; 4];
         for one in &mut four {
-            let lane = rest.trailing_zeros() as usize % WIDE;
+            let lane = rest.trailing_zeros() as usize % LANES;
             rest &= rest.wrapping_sub(1);
             *one = stack_entry(bits[lane], words[lane]);
         }
@@ -157,17 +157,22 @@ pub(crate) trait F32x16: Vector<Array = [f32; WIDE]> + Zeroable {
     /// Puts the first four of those there, the largest first, where there are instructions for that; where there are fewer, zeros behind
     /// them. False where there are none, and nothing is put.
     #[inline(always)]
-    fn put_falling(self, _mask: u32, _words: &[u32; WIDE], _place: &mut [MaybeUninit<i64>; 4]) -> bool {
+    fn store_four_descending(
+        self,
+        _mask: u32,
+        _words: &[u32; LANES],
+        _place: &mut [MaybeUninit<i64>; 4],
+    ) -> bool {
         false
     }
 
     /// Puts the words that the mask chooses there, in their order.
     #[inline(always)]
-    fn put_chosen(mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<u32>; WIDE]) {
-        let mut rest = mask % (1 << WIDE);
+    fn put_chosen(mask: u32, words: &[u32; LANES], place: &mut [MaybeUninit<u32>; LANES]) {
+        let mut rest = mask % (1 << LANES);
         let mut count = 0;
         while rest != 0 {
-            place[count % WIDE] = MaybeUninit::new(words[rest.trailing_zeros() as usize % WIDE]);
+            place[count % LANES] = MaybeUninit::new(words[rest.trailing_zeros() as usize % LANES]);
             count += 1;
             rest &= rest - 1;
         }
@@ -199,4 +204,4 @@ pub(super) const BEFORE_MIDDLE: usize = 5;
 pub(super) const AFTER_MIDDLE: usize = 10;
 
 /// The last bits of a number, in which its place among sixteen may stand.
-pub(crate) const LANE_BITS: i32 = WIDE as i32 - 1;
+pub(crate) const LANE_BITS: i32 = LANES as i32 - 1;

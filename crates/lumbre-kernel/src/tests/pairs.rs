@@ -6,7 +6,7 @@ use lumbre_math::DVec3;
 use super::scenes::Random;
 use crate::intersect::watertight::{self, EdgeTest, Met, Pairs, Shear};
 use crate::intersect::{Dispatch, Isa, Simd};
-use crate::simd::{Row, WIDE};
+use crate::simd::{LANES, Row};
 
 struct Meeting<'a>(&'a Pairs<'a>);
 
@@ -54,7 +54,7 @@ fn sixteen_pairs_meet_as_each_alone() {
     for _ in 0..if cfg!(miri) { 20 } else { 3_000 } {
         let (mut from, mut along) = ([Row::of(0.0); 3], [Row::of(0.0); 3]);
         let mut rows_of_corners = [[Row::of(0.0); 3]; 3];
-        let lanes: Vec<_> = (0..WIDE).map(|_| lane(&mut random)).collect();
+        let lanes: Vec<_> = (0..LANES).map(|_| lane(&mut random)).collect();
         for (i, (direction, origin, corners)) in lanes.iter().enumerate() {
             for axis in 0..3 {
                 from[axis].0[i] = origin[axis];
@@ -106,7 +106,7 @@ fn bits((t, u, v): (f64, f64, f64)) -> [u64; 3] {
     [t.to_bits(), u.to_bits(), v.to_bits()]
 }
 
-struct Columns<'a>(&'a [Ray; WIDE]);
+struct Columns<'a>(&'a [Ray; LANES]);
 
 impl Dispatch for Columns<'_> {
     type Output = [Row<f64>; 8];

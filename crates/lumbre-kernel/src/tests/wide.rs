@@ -2,11 +2,11 @@
 
 use super::scenes::Random;
 use crate::intersect::{Dispatch, Isa, Simd};
-use crate::simd::{F32x8, F32x16, Row, Vector, WIDE};
+use crate::simd::{F32x8, F32x16, LANES, Row, Vector};
 
 /// What is looked at of sixteen rows, and of numbers in double precision.
 struct Together<'a> {
-    rows: &'a [Row<f32>; WIDE],
+    rows: &'a [Row<f32>; LANES],
     exact: &'a Row<f64>,
     place: f64,
     scale: f64,
@@ -57,7 +57,7 @@ impl Dispatch for Together<'_> {
 fn sixteen_numbers_give_together_what_each_gives_alone() {
     let mut random = Random(172);
     for round in 0..200 {
-        let mut rows = [Row::of(0.0); WIDE];
+        let mut rows = [Row::of(0.0); LANES];
         for row in &mut rows {
             row.0 = std::array::from_fn(|_| (random.unit() - 0.5) as f32);
         }
@@ -71,7 +71,7 @@ fn sixteen_numbers_give_together_what_each_gives_alone() {
         if is_one {
             exact = Row::of(exact.0[0]);
         }
-        let differs = if round % 5 == 0 { Some(round % WIDE) } else { None };
+        let differs = if round % 5 == 0 { Some(round % LANES) } else { None };
         if let Some(lane) = differs {
             exact.0[lane] = [f64::NAN, exact.0[lane] + 1e-15][round % 2];
         }
@@ -80,7 +80,7 @@ fn sixteen_numbers_give_together_what_each_gives_alone() {
         let rounded = exact.0.map(|x| (x - place) as f32);
         let rest = std::array::from_fn(|i| (exact.0[i] - place - f64::from(rounded[i])) as f32);
         let with_bits =
-            (0..WIDE).filter(|&i| rows[0].0[i].to_bits() == rows[0].0[3].to_bits()).map(|i| 1 << i).sum();
+            (0..LANES).filter(|&i| rows[0].0[i].to_bits() == rows[0].0[3].to_bits()).map(|i| 1 << i).sum();
         let most = rows.each_ref().map(|row| row.0.iter().copied().fold(f32::NEG_INFINITY, f32::max));
         for isa in Isa::all() {
             let given = isa.run(Together { rows: &rows, exact: &exact, place, scale });
@@ -89,9 +89,9 @@ fn sixteen_numbers_give_together_what_each_gives_alone() {
             assert_eq!(given.most[from..], most[from..8], "{isa:?}");
             assert_eq!(given.with_bits, with_bits, "{isa:?}");
             assert_eq!(given.first.to_bits(), rows[0].0[0].to_bits(), "{isa:?}");
-            assert_eq!(given.middle.0.map(f32::to_bits), [middle.to_bits(); WIDE], "{isa:?}");
+            assert_eq!(given.middle.0.map(f32::to_bits), [middle.to_bits(); LANES], "{isa:?}");
             assert_eq!(given.are_same, is_one && differs.is_none(), "{isa:?}");
-            let bits = |row: [f32; WIDE]| row.map(|x| if x.is_nan() { None } else { Some(x.to_bits()) });
+            let bits = |row: [f32; LANES]| row.map(|x| if x.is_nan() { None } else { Some(x.to_bits()) });
             let scaled = exact.0.map(|x| ((x - place) * scale) as f32);
             assert_eq!(bits(given.rounded.0), bits(scaled), "{isa:?}");
             assert_eq!(bits(given.parted[0].0), bits(rounded), "{isa:?}");
@@ -127,7 +127,7 @@ fn arithmetic<V: Vector>(a: V, b: V, c: V) -> Results {
 }
 
 /// The same of eight and of sixteen.
-struct Arithmetic([[f32; WIDE]; 3]);
+struct Arithmetic([[f32; LANES]; 3]);
 
 impl Dispatch for Arithmetic {
     type Output = [Results; 2];
@@ -135,8 +135,8 @@ impl Dispatch for Arithmetic {
     #[inline(always)]
     fn run<L: Simd>(self) -> [Results; 2] {
         let [a, b, c] = &self.0;
-        let eight = |row: &[f32; WIDE]| L::F32x8::load(row.first_chunk().expect("sixteen"));
-        let wide = |row: &[f32; WIDE]| L::F32x16::load(row);
+        let eight = |row: &[f32; LANES]| L::F32x8::load(row.first_chunk().expect("sixteen"));
+        let wide = |row: &[f32; LANES]| L::F32x16::load(row);
         [arithmetic(eight(a), eight(b), eight(c)), arithmetic(wide(a), wide(b), wide(c))]
     }
 }
@@ -147,7 +147,7 @@ fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
     for _ in 0..100 {
         // Whole numbers, of which nothing is rounded.
         let mut row = || std::array::from_fn(|_| random.below(9) as f32 - 4.0);
-        let [a, b, c]: [[f32; WIDE]; 3] = [row(), row(), row()];
+        let [a, b, c]: [[f32; LANES]; 3] = [row(), row(), row()];
         let alone = |i: usize| {
             let (a, b, c) = (a[i], b[i], c[i]);
             let turned = if b.is_sign_negative() { -a } else { a };
@@ -158,7 +158,7 @@ fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
         for isa in Isa::all() {
             for (results, masks) in isa.run(Arithmetic([a, b, c])) {
                 let count = results[0].len();
-                assert!(count == 8 || count == WIDE);
+                assert!(count == 8 || count == LANES);
                 for i in 0..count {
                     let given: Vec<f32> = results.iter().map(|result| result[i]).collect();
                     assert_eq!(given, alone(i), "{isa:?}");

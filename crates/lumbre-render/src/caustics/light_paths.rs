@@ -58,16 +58,16 @@ impl<'s> ChordSampler<'s> {
     }
 
     /// The line of a sample: the chord of a sphere, chosen by its share of [`ChordSampler::whole`].
-    fn line(&self, draw: &SampleNumbers) -> Ray {
-        let mut left = f64::from(draw.survival(0)) * self.whole / TAU;
+    fn line(&self, numbers: &SampleNumbers) -> Ray {
+        let mut left = f64::from(numbers.survival(0)) * self.whole / TAU;
         let is_chosen = |sphere: &&BoundingSphere| {
             left -= sphere.radius * sphere.radius;
             left < 0.0
         };
         let sphere = self.spheres.iter().find(is_chosen).unwrap_or(&self.spheres[self.spheres.len() - 1]);
-        let direction = warp64::square_to_sphere(draw.lens());
+        let direction = warp64::square_to_sphere(numbers.lens());
         let (across, up) = orthonormal_basis(direction);
-        let offset = sphere.radius * warp64::square_to_disk(draw.filter());
+        let offset = sphere.radius * warp64::square_to_disk(numbers.filter());
         let half = (sphere.radius * sphere.radius - offset.length_squared()).max(0.0).sqrt();
         let middle = sphere.center + offset.x * across + offset.y * up;
         // Clipped to the sphere: points outside would be counted more often than their density.
@@ -124,8 +124,8 @@ impl<'s> LightTracer<'s> {
     /// The photons of some lines of a pass.
     pub(crate) fn trace(&self, pass: u32, lines: Range<u32>, photons: &mut Vec<Photon>) {
         for line in lines {
-            self.each_point(pass, line, true, |point, draw, vertex, time| {
-                self.begin(point, time, draw, vertex, photons);
+            self.each_point(pass, line, true, |point, numbers, vertex, time| {
+                self.begin(point, time, numbers, vertex, photons);
             });
         }
     }
@@ -135,8 +135,8 @@ impl<'s> LightTracer<'s> {
         let count = f64::from(lines.end - lines.start);
         let mut sum = 0.0;
         for line in lines {
-            self.each_point(pass, line, false, |point, draw, vertex, time| {
-                let lit = self.light(point, time, draw, vertex);
+            self.each_point(pass, line, false, |point, numbers, vertex, time| {
+                let lit = self.light(point, time, numbers, vertex);
                 sum += lit.map_or(0.0, |lit| f64::from(lit.flux.average()));
             });
         }
@@ -153,22 +153,29 @@ impl<'s> LightTracer<'s> {
         mut visit: impl FnMut(DVec3, &SampleNumbers, u32, f64),
     ) {
         // Not a pixel of any picture.
-        let draw = self.sampler.draw(u32::MAX, pass, line);
-        let time = self.view.time(draw.time());
-        let chord = self.chords.line(&draw).at_time(time);
+        let numbers = self.sampler.numbers(u32::MAX, pass, line);
+        let time = self.view.time(numbers.time());
+        let chord = self.chords.line(&numbers).at_time(time);
         let mut points = 0;
         self.scene.accel().all(&chord, |hit| {
             if self.scene.may_be_specular(hit) == are_specular {
                 points += 1;
-                visit(chord.at(hit.root.t), &draw, points * VERTICES_A_PATH, time);
+                visit(chord.at(hit.root.t), &numbers, points * VERTICES_A_PATH, time);
             }
             if points < MAX_POINTS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
     }
 
     /// Follows light that arrives at a point of a surface.
-    fn begin(&self, point: DVec3, time: f64, draw: &SampleNumbers, vertex: u32, photons: &mut Vec<Photon>) {
-        let Some(Lit { sample, ray, here, pdf, flux }) = self.light(point, time, draw, vertex) else {
+    fn begin(
+        &self,
+        point: DVec3,
+        time: f64,
+        numbers: &SampleNumbers,
+        vertex: u32,
+        photons: &mut Vec<Photon>,
+    ) {
+        let Some(Lit { sample, ray, here, pdf, flux }) = self.light(point, time, numbers, vertex) else {
             return;
         };
         let length = point.distance(ray.origin);
@@ -184,13 +191,13 @@ impl<'s> LightTracer<'s> {
             bounces: 0,
             is_straight: pdf == f64::INFINITY && self.goes_straight_on,
         };
-        self.arrive(&mut path, &sample, &here, draw);
-        self.follow(path, ray, here, draw, vertex, photons);
+        self.arrive(&mut path, &sample, &here, numbers);
+        self.follow(path, ray, here, numbers, vertex, photons);
     }
 
     /// The light of one sample that arrives at a point of a surface on a line.
-    fn light(&self, point: DVec3, time: f64, draw: &SampleNumbers, vertex: u32) -> Option<Lit<'s>> {
-        let (choose, u) = (draw.light_choice(vertex), draw.light_point(vertex));
+    fn light(&self, point: DVec3, time: f64, numbers: &SampleNumbers, vertex: u32) -> Option<Lit<'s>> {
+        let (choose, u) = (numbers.light_choice(vertex), numbers.light_point(vertex));
         let sample = self.scene.sample_light(point, DVec3::ZERO, time, choose, u)?;
         let ray = self.ray_to(point, &sample).at_time(time);
         let hit = self.scene.closest(&ray)?;
@@ -232,7 +239,7 @@ impl<'s> LightTracer<'s> {
         path: &mut LightPath<'s>,
         sample: &LightSample,
         here: &Interaction<'s>,
-        draw: &SampleNumbers,
+        numbers: &SampleNumbers,
     ) {
         path.interiors.arrive(here, here.resolved());
         // Light from infinity was not inside any solid.
@@ -247,7 +254,7 @@ impl<'s> LightTracer<'s> {
                 Some(end) => Ray::new(start, end.point - start).with_range(0.0, 1.0),
                 None => Ray::new(start, sample.towards),
             };
-            path.flux *= self.scene.transmittance(path.medium, &back, draw.along(&back), None);
+            path.flux *= self.scene.transmittance(path.medium, &back, numbers.along(&back), None);
         }
     }
 
@@ -257,7 +264,7 @@ impl<'s> LightTracer<'s> {
         mut path: LightPath<'s>,
         mut ray: Ray,
         mut here: Interaction<'s>,
-        draw: &SampleNumbers,
+        numbers: &SampleNumbers,
         first: u32,
         photons: &mut Vec<Photon>,
     ) {
@@ -270,7 +277,8 @@ impl<'s> LightTracer<'s> {
                 return;
             }
             let number = first + path.bounces;
-            let Some(part) = self.bounce(&mut path, &vertex, draw.lobe(number), draw.survival(number)) else {
+            let Some(part) = self.bounce(&mut path, &vertex, numbers.lobe(number), numbers.survival(number))
+            else {
                 return;
             };
             if part.crosses {
@@ -286,7 +294,7 @@ impl<'s> LightTracer<'s> {
             let hit = self.scene.closest(&ray);
             if self.scene.has_media() && !path.is_straight {
                 let end = hit.as_ref().map_or(f64::INFINITY, |hit| hit.root.t);
-                photons.extend(self.photon_in_medium(&path, &ray.with_range(0.0, end), draw, number));
+                photons.extend(self.photon_in_medium(&path, &ray.with_range(0.0, end), numbers, number));
             }
             let Some(hit) = hit else { return };
             let next = self.scene.interaction(&ray, &hit, &Footprint::Point);
@@ -295,7 +303,7 @@ impl<'s> LightTracer<'s> {
             path.flux *= path.interiors.transmittance(way);
             path.length += way;
             if self.scene.has_media() {
-                self.cross_media(&mut path, &ray.with_range(0.0, way), draw);
+                self.cross_media(&mut path, &ray.with_range(0.0, way), numbers);
             }
             if path.flux.is_black() || !path.flux.is_finite() {
                 return;
@@ -342,14 +350,14 @@ impl<'s> LightTracer<'s> {
         &self,
         path: &LightPath<'s>,
         segment: &Ray,
-        draw: &SampleNumbers,
+        numbers: &SampleNumbers,
         vertex: u32,
     ) -> Option<Photon> {
         if path.interiors.attenuates() {
             return None;
         }
         let typical = typical_way(self.scene);
-        let u = f64::from(draw.direction(vertex).x);
+        let u = f64::from(numbers.direction(vertex).x);
         let at = typical * u / (1.0 - u);
         if at >= segment.t_max {
             return None;
@@ -359,7 +367,7 @@ impl<'s> LightTracer<'s> {
         let mut crossings = Vec::new();
         self.scene.crossings(&before, &mut crossings);
         let medium = crossings.last().map_or(path.medium, |crossing| crossing.beyond)?;
-        let transmittance = self.scene.transmittance(path.medium, &before, draw.along(&before), None);
+        let transmittance = self.scene.transmittance(path.medium, &before, numbers.along(&before), None);
         let photon = Photon {
             point: segment.at(at),
             towards: -segment.direction.as_vec3(),
@@ -374,8 +382,8 @@ impl<'s> LightTracer<'s> {
     }
 
     /// Traces a light path through media along its next segment.
-    fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, draw: &SampleNumbers) {
-        path.flux *= self.scene.transmittance(path.medium, segment, draw.along(segment), None);
+    fn cross_media(&self, path: &mut LightPath<'s>, segment: &Ray, numbers: &SampleNumbers) {
+        path.flux *= self.scene.transmittance(path.medium, segment, numbers.along(segment), None);
         let mut crossings = Vec::new();
         self.scene.crossings(segment, &mut crossings);
         if let Some(last) = crossings.last() {

@@ -72,7 +72,7 @@ fn squared_error(image: &Image) -> f64 {
 }
 
 #[test]
-fn noise_falls_and_edges_of_albedo_and_normals_stay_where_they_are() {
+fn noise_falls_and_edges_stay_sharp() {
     for (samples, least) in [(4, 20.0), (16, 20.0), (64, 8.0)] {
         let rendered = rendered(samples, &noisy);
         let denoised = denoise(&rendered, 1).unwrap().image;
@@ -132,7 +132,7 @@ fn few_samples_and_none_give_numbers() {
 }
 
 #[test]
-fn a_coarse_picture_is_filtered_as_the_small_one_that_it_is_and_enlarged() {
+fn a_coarse_picture_is_filtered_small_then_enlarged() {
     // Every third pixel has samples.
     let coarse = |side: u32| {
         let mut rendered = rendered(8, &noisy);
@@ -214,7 +214,7 @@ fn any_number_of_threads_denoises_to_the_same_bytes() {
 }
 
 #[test]
-fn what_is_cancelled_gives_no_picture_and_the_token_of_nobody_changes_nothing() {
+fn a_cancelled_filter_gives_no_picture() {
     let rendered = rendered(8, &|x, y, _| truth(x, y));
     let cancel = crate::CancelToken::new();
     let whole = denoise(&rendered, 2);

@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn filters_with_negative_lobes_have_negative_samples_and_the_others_have_none() {
+    fn only_negative_lobes_give_negative_samples() {
         for (shape, radius) in SHAPES {
             let filter = Filter::new(shape, DVec2::splat(radius)).unwrap();
             let weight = |i: usize| filter.sample(DVec2::new(i as f64 / 4096.0, 0.37)).weight;

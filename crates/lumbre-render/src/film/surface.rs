@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn means_are_of_the_samples_that_see_something_and_variances_of_all() {
+    fn means_count_hits_and_variances_count_all_samples() {
         let sample = SurfaceSample {
             point: [1.0, -2.0, 12.0],
             slope: [0.5, 0.25],

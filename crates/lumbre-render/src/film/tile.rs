@@ -492,7 +492,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sample_goes_to_its_own_pixel_and_one_that_is_not_finite_to_none() {
+    fn samples_go_to_their_pixel_unless_not_finite() {
         let extras = Extras { features: true, tints: true, ..Extras::default() };
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 9, y1: 10 }, extras);
         let coverage = Rgb::splat(0.25);
@@ -513,7 +513,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_spreads_over_the_pixels_of_its_square_that_have_none() {
+    fn samples_spread_over_empty_pixels_of_their_square() {
         let mut tile = Tile::new(PixelBounds { x0: 5, y0: 7, x1: 10, y1: 10 }, Extras::default());
         let sample = |value| Sample { radiance: Rgb::splat(value), ..Sample::default() };
         for (x, y, value) in [(5, 7, 1.0), (7, 7, 2.0), (9, 7, 3.0), (5, 9, 4.0), (6, 8, 9.0)] {

@@ -24,15 +24,15 @@ impl RayIntegrator for AmbientOcclusion {
         &self,
         scene: &Scene,
         _: &View,
-        sight: PrimaryHit<'_>,
-        draw: &SampleNumbers,
+        primary_hit: PrimaryHit<'_>,
+        numbers: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
-        let Some(met) = &sight.met else {
-            record.note(|| Event::Left { ray: sight.ray.ray });
+        let Some(met) = &primary_hit.met else {
+            record.note(|| Event::Left { ray: primary_hit.ray.ray });
             return Spectrum::BLACK;
         };
-        record.note(|| Event::Met(Met::of(&sight.ray.ray, met, 0, Spectrum::WHITE)));
+        record.note(|| Event::Met(Met::of(&primary_hit.ray.ray, met, 0, Spectrum::WHITE)));
         let smooth = met.shading.normal;
         let normal = match self.shading_normals {
             ShadingNormals::Pbrt if ShadingNormals::differ(smooth, met.shading.geometric) => {
@@ -42,7 +42,7 @@ impl RayIntegrator for AmbientOcclusion {
         };
         let facing = if normal.dot(met.towards_origin.as_vec3()) < 0.0 { -normal } else { normal };
         let frame = ShadingFrame::new(facing, met.shading.dpdu);
-        let u = draw.direction(0);
+        let u = numbers.direction(0);
         let (local, weight) = if self.cosine {
             (warp::square_to_cosine_hemisphere(u), 1.0)
         } else {

@@ -27,8 +27,8 @@ impl Caustics {
 }
 
 impl Integrator for Caustics {
-    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
-        let (scene, view) = (sights.scene(), sights.view());
+    fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
+        let (scene, view) = (primary_hits.scene(), primary_hits.view());
         let mut setting = self.path.setting(scene, sampler);
         if let Some(chords) = ChordSampler::new(scene).filter(|_| !scene.lights().is_empty()) {
             let tracer = LightTracer {
@@ -40,7 +40,7 @@ impl Integrator for Caustics {
                 max_bounces: self.path.max_depth.saturating_sub(1),
                 goes_straight_on: setting.has_panes,
             };
-            let mut numbers: Vec<u32> = sights.indices().map(Merging::pass_of).collect();
+            let mut numbers: Vec<u32> = primary_hits.indices().map(Merging::pass_of).collect();
             numbers.sort_unstable();
             numbers.dedup();
             let [width, height] = view.size();
@@ -50,7 +50,7 @@ impl Integrator for Caustics {
             let lines = lines_of(width, height).into();
             setting.merging = Some(Merging { chords, passes, lines, typical_way: typical_way(scene) });
         }
-        sights.follow(&setting, record);
+        primary_hits.follow(&setting, record);
     }
 
     fn needs_footprints(&self) -> bool {

@@ -16,16 +16,16 @@ impl RayIntegrator for FeatureIntegrator {
         &self,
         _: &Scene,
         view: &View,
-        sight: PrimaryHit<'_>,
+        primary_hit: PrimaryHit<'_>,
         _: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
-        let ray = sight.ray.ray;
-        match &sight.met {
+        let ray = primary_hit.ray.ray;
+        match &primary_hit.met {
             Some(met) => record.note(|| Event::Met(Met::of(&ray, met, 0, Spectrum::WHITE))),
             None => record.note(|| Event::Left { ray }),
         }
-        let Some(features) = Features::of(view, &sight) else { return Spectrum::BLACK };
+        let Some(features) = Features::of(view, &primary_hit) else { return Spectrum::BLACK };
         let value = features.get(self.0);
         let shown = if self.0 == Feature::Normal { (value + Spectrum::WHITE) * 0.5 } else { value };
         record.added(Source::Surface, Spectrum::WHITE, shown, 1.0)

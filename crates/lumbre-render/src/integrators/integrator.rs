@@ -11,7 +11,7 @@ use crate::wave::PrimaryHits;
 /// An estimator of the radiance that arrives at the camera, of many samples at a time.
 pub trait Integrator: Debug + Send + Sync {
     /// Gives each of the samples an estimate of the radiance along its ray from the camera.
-    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record);
+    fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record);
 
     /// Whether it takes samples that carry wavelengths in place of linear Rec. 709.
     fn carries_wavelengths(&self) -> bool {
@@ -31,15 +31,15 @@ pub trait RayIntegrator: Debug + Send + Sync {
         &self,
         scene: &Scene,
         view: &View,
-        sight: PrimaryHit<'_>,
-        draw: &SampleNumbers,
+        primary_hit: PrimaryHit<'_>,
+        numbers: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum;
 }
 
 impl<T: RayIntegrator> Integrator for T {
-    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
-        let (scene, view) = (sights.scene(), sights.view());
-        sights.each(|sight, draw| self.radiance(scene, view, sight, draw, record));
+    fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
+        let (scene, view) = (primary_hits.scene(), primary_hits.view());
+        primary_hits.each(|primary_hit, numbers| self.radiance(scene, view, primary_hit, numbers, record));
     }
 }

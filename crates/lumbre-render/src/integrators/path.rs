@@ -70,10 +70,10 @@ impl Path {
 }
 
 impl Integrator for Path {
-    fn estimate(&self, sights: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
-        let is_spectral = sights.are_spectral();
-        let setting = Setting { is_spectral, ..self.setting(sights.scene(), sampler) };
-        sights.follow(&setting, record);
+    fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record) {
+        let is_spectral = primary_hits.are_spectral();
+        let setting = Setting { is_spectral, ..self.setting(primary_hits.scene(), sampler) };
+        primary_hits.follow(&setting, record);
     }
 
     fn carries_wavelengths(&self) -> bool {

@@ -56,7 +56,7 @@ impl RayIntegrator for Pov {
         &self,
         scene: &Scene,
         _: &View,
-        sight: PrimaryHit<'_>,
+        primary_hit: PrimaryHit<'_>,
         _: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
@@ -66,7 +66,7 @@ impl RayIntegrator for Pov {
             _ => None,
         });
         let tracer = Tracer { scene, world, lights: lights.collect() };
-        let ray = sight.ray.ray;
+        let ray = primary_hit.ray.ray;
         let is_at_eye = ray.origin.distance(world.eye) <= NEAR * (1.0 + world.eye.length());
         let first = Traced {
             inside: if is_at_eye {

@@ -59,7 +59,7 @@ impl Whitted {
         scene: &'s Scene,
         here: &'a Interaction<'s>,
         came: &'a Arrival<'s>,
-        draw: &SampleNumbers,
+        numbers: &SampleNumbers,
         pending: &mut SmallVec<[Branch<'s>; 4]>,
         record: &mut Record,
     ) -> Scatterers<'a, 's> {
@@ -74,7 +74,7 @@ impl Whitted {
                 let mut throughput = came.throughput * part.weight * share;
                 let carries = throughput.max_component();
                 if carries < FAINT {
-                    if draw.branch(came.vertex, branch) * FAINT >= carries {
+                    if numbers.branch(came.vertex, branch) * FAINT >= carries {
                         continue;
                     }
                     throughput *= FAINT / carries;
@@ -107,7 +107,7 @@ impl Whitted {
         here: &Interaction,
         scatterers: &Scatterers<'_, 's>,
         came: &Arrival<'s>,
-        draw: &SampleNumbers,
+        numbers: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
         let from = here.shadow_origin();
@@ -119,7 +119,7 @@ impl Whitted {
             let points = if light.is_delta() { 1 } else { self.light_samples.max(1) };
             let mut sum = Spectrum::BLACK;
             for point in 0..points {
-                let u = draw.point_on_each_light(came.vertex, label, point, points);
+                let u = numbers.point_on_each_light(came.vertex, label, point, points);
                 if let Some(sample) = scene.sample_one_light(id, from, here.time, u) {
                     sum += scattered(scene, scatterers, &came.interiors, &sample, record);
                 }
@@ -127,7 +127,7 @@ impl Whitted {
             sum * (1.0 / points as f32)
         };
         if lights.len() > EVERY_LIGHT_UP_TO {
-            let choice = scene.choose_light(draw.light_choice(came.vertex));
+            let choice = scene.choose_light(numbers.light_choice(came.vertex));
             return choice.map_or(Spectrum::BLACK, |(id, probability)| {
                 by_light(record, id, &lights[id.0 as usize], 0) * (1.0 / probability) as f32
             });
@@ -153,13 +153,13 @@ impl RayIntegrator for Whitted {
         &self,
         scene: &Scene,
         _: &View,
-        sight: PrimaryHit<'_>,
-        draw: &SampleNumbers,
+        primary_hit: PrimaryHit<'_>,
+        numbers: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
         let mut radiance = Spectrum::BLACK;
         let mut pending: SmallVec<[Branch; 4]> = SmallVec::new();
-        let (mut ray, mut met) = (sight.ray.ray, sight.met);
+        let (mut ray, mut met) = (primary_hit.ray.ray, primary_hit.met);
         let mut came =
             Arrival { interiors: MediumStack::default(), throughput: Spectrum::WHITE, depth: 0, vertex: 0 };
         loop {
@@ -170,9 +170,9 @@ impl RayIntegrator for Whitted {
                 record.note(|| Event::Met(Met::of(&ray, here, came.depth, came.throughput)));
                 radiance += record.added(Source::Surface, came.throughput, here.emitted(), 1.0);
                 if came.depth < self.max_depth {
-                    let scatterers = self.split(scene, here, &came, draw, &mut pending, record);
+                    let scatterers = self.split(scene, here, &came, numbers, &mut pending, record);
                     if !scatterers.is_empty() {
-                        let direct = self.direct(scene, here, &scatterers, &came, draw, record);
+                        let direct = self.direct(scene, here, &scatterers, &came, numbers, record);
                         radiance += record.added(Source::Direct, came.throughput, direct, 1.0);
                     }
                 }

@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_stay_tiles_when_they_are_merged_and_a_gap_has_no_samples() {
+    fn merged_tiles_stay_tiles_and_gaps_have_no_samples() {
         let whole = state(WHOLE, 0..7);
         let tiles = WHOLE.tiles(4);
         let mut merged = state(tiles[0], 0..3);

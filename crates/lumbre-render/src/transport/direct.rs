@@ -21,7 +21,7 @@ use crate::transport::through::straight_on;
 /// Transport Simulation and Rendering System", 2017, A.3.
 ///
 /// If the faces of a mesh approximate a smooth surface that bulges out over them, directions below a face but above
-/// that surface are valid: they stay as they are, and their rays start on it ([`Interaction::risen`]). So shadows end
+/// that surface are valid: they stay as they are, and their rays start on it ([`Interaction::unoccluded_terminator_origin`]). So shadows end
 /// where the smooth surface turns away from the light, not at the edge of a face. J. Hanika ("Hacking the Shadow
 /// Terminator", 2021) starts all rays there. Here only rays below the face do, so that objects on the surface do not
 /// seem to hover.
@@ -39,8 +39,8 @@ pub(crate) struct Vertex<'a, 's> {
     /// That normal, if it only decides the side of a direction, as in pbrt.
     side: Option<Vec3>,
     scene: &'s Scene,
-    /// [`Interaction::risen`], computed on demand.
-    risen: OnceCell<Option<DVec3>>,
+    /// [`Interaction::unoccluded_terminator_origin`], computed on demand.
+    terminator_origin: OnceCell<Option<DVec3>>,
 }
 
 /// The next direction of a path.
@@ -107,8 +107,8 @@ impl<'a, 's> Vertex<'a, 's> {
             ShadingNormals::Lumbre => (side, None),
             ShadingNormals::Pbrt => (None, side),
         };
-        let risen = OnceCell::new();
-        Some(Self { met, bsdf, material, frame, wo, geometric, side, scene, risen })
+        let terminator_origin = OnceCell::new();
+        Some(Self { met, bsdf, material, frame, wo, geometric, side, scene, terminator_origin })
     }
 
     /// Whether the BSDF reflects to a direction.
@@ -129,11 +129,11 @@ impl<'a, 's> Vertex<'a, 's> {
         geometric.dot(wi) <= 0.0
             && smooth.dot(wi) > 0.0
             && self.wo.same_hemisphere(self.frame.to_local(wi))
-            && self.risen().is_some()
+            && self.terminator_origin().is_some()
     }
 
-    fn risen(&self) -> Option<DVec3> {
-        *self.risen.get_or_init(|| self.met.risen(self.scene))
+    fn terminator_origin(&self) -> Option<DVec3> {
+        *self.terminator_origin.get_or_init(|| self.met.unoccluded_terminator_origin(self.scene))
     }
 
     /// The BSDF directions that map to this one: itself, and the one that is folded onto it.
@@ -225,12 +225,12 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     /// The origin of rays in a unit direction, if it is off the face.
-    pub(crate) fn risen_towards(&self, direction: DVec3) -> Option<DVec3> {
-        if self.stays(direction.as_vec3()) { self.risen() } else { None }
+    pub(crate) fn terminator_origin_towards(&self, direction: DVec3) -> Option<DVec3> {
+        if self.stays(direction.as_vec3()) { self.terminator_origin() } else { None }
     }
 
     fn start(&self, direction: DVec3) -> DVec3 {
-        self.risen_towards(direction).unwrap_or_else(|| self.met.start(direction))
+        self.terminator_origin_towards(direction).unwrap_or_else(|| self.met.start(direction))
     }
 
     /// The ray of a bounce.

@@ -73,8 +73,8 @@ impl Features {
     }
 
     /// The features of a first hit, if any.
-    pub fn of(view: &View, sight: &PrimaryHit) -> Option<Self> {
-        let met = sight.met.as_ref()?;
+    pub fn of(view: &View, primary_hit: &PrimaryHit) -> Option<Self> {
+        let met = primary_hit.met.as_ref()?;
         let scattering = met.scattering();
         let (normal, albedo) = match &scattering {
             Some((frame, bsdf)) => (frame.n, bsdf.albedo()),

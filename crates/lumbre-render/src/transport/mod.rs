@@ -5,16 +5,16 @@ pub(crate) mod direct;
 mod features;
 pub(crate) mod interior;
 pub(crate) mod journal;
+mod primary_hit;
 pub(crate) mod sampler;
 pub(crate) mod seen;
-mod sight;
 mod strategy;
 pub(crate) mod through;
 
 pub use counts::RayCounts;
 pub use features::{Feature, Features};
 pub use journal::{End, Event, MergedPhoton, Met, Record, SampledLight, Scattered, Source};
+pub use primary_hit::PrimaryHit;
 pub use sampler::{SampleNumbers, Sampler};
 pub(crate) use seen::{Seen, caught};
-pub use sight::PrimaryHit;
 pub use strategy::Strategy;

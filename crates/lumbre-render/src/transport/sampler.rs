@@ -36,7 +36,7 @@ impl Sampler {
 
     /// The numbers of one sample of the pixel in column `x` and row `y`.
     #[inline]
-    pub fn draw(&self, x: u32, y: u32, index: u32) -> SampleNumbers {
+    pub fn numbers(&self, x: u32, y: u32, index: u32) -> SampleNumbers {
         SampleNumbers { kind: self.kind, pixel: self.pixel(x, y), index }
     }
 
@@ -282,12 +282,12 @@ mod tests {
     fn numbers_depend_on_every_argument_and_stay_in_range() {
         for kind in [SamplerKind::Sobol, SamplerKind::Independent] {
             let sampler = |seed| Sampler::new(&SamplerDesc { kind, spp: None, seed });
-            let base = sampler(3).draw(5, 7, 11);
+            let base = sampler(3).numbers(5, 7, 11);
             let others = [
-                sampler(4).draw(5, 7, 11),
-                sampler(3).draw(6, 7, 11),
-                sampler(3).draw(5, 8, 11),
-                sampler(3).draw(5, 7, 12),
+                sampler(4).numbers(5, 7, 11),
+                sampler(3).numbers(6, 7, 11),
+                sampler(3).numbers(5, 8, 11),
+                sampler(3).numbers(5, 7, 12),
             ];
             for other in others {
                 assert_ne!(base.aim(), other.aim());
@@ -295,11 +295,11 @@ mod tests {
             }
             assert_ne!(base.direction(2), base.direction(3));
             assert_ne!(base.light_point(2), base.lens());
-            assert_eq!(base.direction(2), sampler(3).draw(5, 7, 11).direction(2));
+            assert_eq!(base.direction(2), sampler(3).numbers(5, 7, 11).direction(2));
             for index in 0..4096 {
-                let draw = sampler(3).draw(5, 7, index);
-                assert!((0.0..1.0).contains(&draw.lobe(1)) && (0.0..1.0).contains(&draw.survival(1)));
-                assert!(draw.light_point(1).max_element() < 1.0);
+                let numbers = sampler(3).numbers(5, 7, index);
+                assert!((0.0..1.0).contains(&numbers.lobe(1)) && (0.0..1.0).contains(&numbers.survival(1)));
+                assert!(numbers.light_point(1).max_element() < 1.0);
             }
         }
     }
@@ -309,7 +309,7 @@ mod tests {
         let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 9 });
         let mut cells = [0; 64];
         for (index, point) in (0..16).flat_map(|index| (0..4).map(move |point| (index, point))) {
-            let u = sampler.draw(13, 2, index).point_on_each_light(3, 5, point, 4);
+            let u = sampler.numbers(13, 2, index).point_on_each_light(3, 5, point, 4);
             cells[(u.x * 8.0) as usize * 8 + (u.y * 8.0) as usize] += 1;
         }
         assert_eq!(cells, [1; 64]);
@@ -317,11 +317,11 @@ mod tests {
 
     #[test]
     fn independent_points_on_a_light_are_all_different() {
-        let draw =
-            Sampler::new(&SamplerDesc { kind: SamplerKind::Independent, spp: None, seed: 9 }).draw(13, 2, 4);
+        let numbers = Sampler::new(&SamplerDesc { kind: SamplerKind::Independent, spp: None, seed: 9 })
+            .numbers(13, 2, 4);
         let mut seen = Vec::new();
         for (light, point) in (0..3).flat_map(|light| (0..100).map(move |point| (light, point))) {
-            let u = draw.point_on_each_light(2, light, point, 100);
+            let u = numbers.point_on_each_light(2, light, point, 100);
             assert!(u.min_element() >= 0.0 && u.max_element() < 1.0 && u.x != u.y);
             seen.extend([u.x.to_bits(), u.y.to_bits()]);
         }
@@ -335,7 +335,7 @@ mod tests {
         let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 9 });
         let mut cells = [0; 64];
         for index in 64..128 {
-            cells[(sampler.draw(13, 2, index).aim()[2] * 64.0) as usize] += 1;
+            cells[(sampler.numbers(13, 2, index).aim()[2] * 64.0) as usize] += 1;
         }
         assert_eq!(cells, [1; 64]);
     }
@@ -345,7 +345,7 @@ mod tests {
         let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 9 });
         let mut cells = [0; 64];
         for index in 64..128 {
-            let u = sampler.draw(13, 2, index).light_point(3);
+            let u = sampler.numbers(13, 2, index).light_point(3);
             cells[(u.x * 8.0) as usize * 8 + (u.y * 8.0) as usize] += 1;
         }
         assert_eq!(cells, [1; 64]);

@@ -41,19 +41,19 @@ pub(crate) struct Seen {
 /// blocked light is estimated, so that unshadowed ground has no noise.)
 pub(crate) fn caught(
     scene: &Scene,
-    sight: &PrimaryHit<'_>,
-    draw: &SampleNumbers,
+    primary_hit: &PrimaryHit<'_>,
+    numbers: &SampleNumbers,
     lights_are_seen: bool,
     record: &mut Record,
 ) -> Option<Seen> {
     let behind = |ray| if lights_are_seen { scene.background(ray).sum() } else { Spectrum::BLACK };
     let covered = if lights_are_seen { Spectrum::WHITE } else { Spectrum::BLACK };
     let catcher = scene.ground().filter(|ground| ground.catcher);
-    match (&sight.met, catcher) {
+    match (&primary_hit.met, catcher) {
         (Some(met), Some(ground)) if ground.holds(met) => {
-            let lost = lost(scene, ground, met, draw, record);
+            let lost = lost(scene, ground, met, numbers, record);
             let open = ground.open_irradiance(met.surface.point, met.time);
-            Some(Seen::of_catcher(lost, open, lights_are_seen, behind(&sight.ray.ray), record))
+            Some(Seen::of_catcher(lost, open, lights_are_seen, behind(&primary_hit.ray.ray), record))
         }
         (None, _) if !lights_are_seen => {
             Some(Seen { radiance: Spectrum::BLACK, coverage: covered, on_catcher: false })
@@ -85,7 +85,7 @@ fn lost(
     scene: &Scene,
     ground: &GroundPlane,
     at: &Interaction<'_>,
-    draw: &SampleNumbers,
+    numbers: &SampleNumbers,
     record: &mut Record,
 ) -> Spectrum {
     let from = at.shadow_origin();
@@ -97,10 +97,10 @@ fn lost(
     for i in 0..SAMPLES * asked as u32 {
         let chosen = match lights.len() <= MAX_LIGHTS {
             true => i as usize % asked,
-            false => (draw.light_choice(i) * lights.len() as f64) as usize,
+            false => (numbers.light_choice(i) * lights.len() as f64) as usize,
         };
         let Some(&light) = lights.get(chosen) else { continue };
-        let Some(sample) = scene.sample_one_light(light, from, at.time, draw.light_point(i)) else {
+        let Some(sample) = scene.sample_one_light(light, from, at.time, numbers.light_point(i)) else {
             continue;
         };
         let density = match sample.scatter {
@@ -119,7 +119,7 @@ fn lost(
             if scene.is_occluded(&shadow_ray) { Spectrum::BLACK } else { Spectrum::WHITE }
         };
         if scene.has_media() {
-            left *= scene.transmittance(None, &shadow_ray, draw.along(&shadow_ray), None);
+            left *= scene.transmittance(None, &shadow_ray, numbers.along(&shadow_ray), None);
         }
         if left == Spectrum::WHITE {
             continue;
@@ -127,7 +127,7 @@ fn lost(
         lost += sample.radiance * (Spectrum::WHITE - left) * (cosine * share / (density * SAMPLES as f32));
     }
     if scene.is_transmissive() {
-        lost = lost - passed(scene, ground, at, draw, record);
+        lost = lost - passed(scene, ground, at, numbers, record);
     }
     lost
 }
@@ -140,7 +140,7 @@ fn passed(
     scene: &Scene,
     ground: &GroundPlane,
     at: &Interaction<'_>,
-    draw: &SampleNumbers,
+    numbers: &SampleNumbers,
     record: &mut Record,
 ) -> Spectrum {
     let frame = Frame::from_z(ground.normal);
@@ -152,7 +152,7 @@ fn passed(
             return Spectrum::BLACK;
         }
         let ray = at.leave(direction);
-        let light = light_through(scene, ray, draw, way << WAY_BITS, record);
+        let light = light_through(scene, ray, numbers, way << WAY_BITS, record);
         if light.is_black() {
             return Spectrum::BLACK;
         }
@@ -165,13 +165,13 @@ fn passed(
             at.shadow_origin(),
             ground.normal,
             at.time,
-            draw.light_choice(i),
-            draw.light_point(i),
+            numbers.light_choice(i),
+            numbers.light_point(i),
         );
         if let Some(LightSample { scatter: Scatter::Density(_), end: None, towards, .. }) = sample {
             irradiance += along(towards, 1 + 2 * i, record);
         }
-        let local = warp64::square_to_cosine_hemisphere(draw.direction(i).as_dvec2());
+        let local = warp64::square_to_cosine_hemisphere(numbers.direction(i).as_dvec2());
         irradiance += along(frame.to_world(local), 2 + 2 * i, record);
     }
     irradiance / SAMPLES as f32

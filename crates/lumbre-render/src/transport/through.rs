@@ -36,7 +36,7 @@ pub(crate) fn hero_alone(throughput: Spectrum) -> Spectrum {
 pub(crate) fn light_through(
     scene: &Scene,
     mut ray: Ray,
-    draw: &SampleNumbers,
+    numbers: &SampleNumbers,
     first: u32,
     record: &mut Record,
 ) -> Spectrum {
@@ -63,7 +63,8 @@ pub(crate) fn light_through(
         let Some(vertex) = Vertex::new(scene, &here, &interiors, ShadingNormals::Lumbre) else {
             return Spectrum::BLACK;
         };
-        let Some(bounce) = vertex.sample(draw.lobe(first + surface), draw.direction(first + surface)) else {
+        let Some(bounce) = vertex.sample(numbers.lobe(first + surface), numbers.direction(first + surface))
+        else {
             return Spectrum::BLACK;
         };
         let is_inside = (index - 1.0).abs() > INDEX_ERROR;

@@ -99,7 +99,7 @@ impl<'s> Catcher<'s> {
         shadows.search(self.scene, is_single, slots);
         let mut lost = vec![Spectrum::BLACK; slots.time.len()];
         for segment in (0..shadows.len).filter(|&segment| shadows.blocked[segment]) {
-            lost[shadows.slot[segment] as usize] += shadows.light(segment);
+            lost[shadows.slot[segment] as usize] += shadows.contribution(segment);
         }
         let mut behind: [Vec<f32>; 3] = Default::default();
         behind.iter_mut().for_each(|column| grow(column, count));
@@ -147,12 +147,12 @@ impl Job for Light<'_, '_> {
         while done < count {
             let lanes = R::Mask::first(count - done);
             let slot = R::UInt::from_slice(&places.slots[done..]);
-            let draw = LaneNumbers::<R> {
+            let numbers = LaneNumbers::<R> {
                 kind: sampler,
                 pixel: [R::UInt::gather(&slots.pixel[0], slot), R::UInt::gather(&slots.pixel[1], slot)],
                 index: R::UInt::gather(&slots.index, slot),
             };
-            let u = draw.light(R::UInt::splat(number));
+            let u = numbers.light(R::UInt::splat(number));
             let [x, y, z] = &places.origin;
             let receiver = Receiver::<R> {
                 from: V3 {
@@ -173,9 +173,9 @@ impl Job for Light<'_, '_> {
                 &Segment {
                     slot,
                     origin: receiver.from,
-                    way: sample.towards.to_double(),
+                    to_light: sample.towards.to_double(),
                     end: R::Double::splat(f64::INFINITY),
-                    light: sample.radiance * share,
+                    contribution: sample.radiance * share,
                 },
             );
             done += R::LANES;

@@ -35,7 +35,7 @@ impl Job for Escape<'_, '_> {
             done += R::LANES;
             let receiver = Receiver::<R> {
                 from: gather64::<R>(&paths.origin, at),
-                normal: gather3(&paths.receiver, at),
+                normal: gather3(&paths.receiver_normal, at),
                 time: setting
                     .moves
                     .then_some(R::Double::gather(&slots.time, R::UInt::gather(&paths.slot, at))),

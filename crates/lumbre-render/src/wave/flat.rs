@@ -251,14 +251,14 @@ fn light_pdf<R: Real>(
     shines: R::Mask,
     point: V3<R::Double>,
 ) -> R {
-    let least = R::gather(&paths.pdf, at).simd_min(R::gather(&paths.merging, at));
+    let least = R::gather(&paths.pdf, at).simd_min(R::gather(&paths.merge_pdf, at));
     let chosen = shines & least.simd_lt(R::splat(f32::INFINITY));
     if chosen.none() {
         return R::zero();
     }
     let receiver = Receiver::<R> {
         from: gather64::<R>(&paths.origin, at),
-        normal: gather3(&paths.receiver, at),
+        normal: gather3(&paths.receiver_normal, at),
         // Moving surfaces are never flat hits.
         time: None,
     };

@@ -22,7 +22,7 @@ impl<'s> Wave<'s> {
     /// Traces all paths through media to their next surface; records those that scatter or end before it.
     pub(super) fn cross_media(&mut self, setting: &Setting<'s>, record: &mut Record) {
         self.collisions.clear();
-        self.taken.clear();
+        self.stopped_in_medium.clear();
         if !setting.has_media {
             return;
         }
@@ -31,13 +31,13 @@ impl<'s> Wave<'s> {
             // Inside a solid, only the medium of its material counts.
             let is_inside = self.slots.interiors.get(slot).is_some_and(|solids| solids.attenuates());
             let arrives = is_inside || self.cross(setting, path, slot, record);
-            self.taken.push(!arrives);
+            self.stopped_in_medium.push(!arrives);
         }
     }
 
     /// Whether a path scatters or ends before what its ray meets.
-    pub(super) fn is_taken(&self, path: usize) -> bool {
-        self.taken.get(path).is_some_and(|&taken| taken)
+    pub(super) fn is_stopped_in_medium(&self, path: usize) -> bool {
+        self.stopped_in_medium.get(path).is_some_and(|&stopped| stopped)
     }
 
     /// Traces a path through media to what it meets; false if it scatters or ends before.
@@ -81,7 +81,7 @@ impl<'s> Wave<'s> {
     ) -> bool {
         let way = Way { origin: ray.at(start), direction: ray.direction, length: end - start };
         let throughput = self.paths.throughput(path);
-        let numbers = self.slots.draw(slot).passage(self.slots.distance_samples[slot]);
+        let numbers = self.slots.numbers(slot).passage(self.slots.distance_samples[slot]);
         self.slots.distance_samples[slot] += 1;
         let wavelengths = self.slots.wavelengths.get(slot);
         let passage = setting.scene.medium(medium).sample(&way, throughput, numbers, wavelengths);
@@ -132,9 +132,9 @@ impl<'s> Wave<'s> {
         let (scene, from) = (setting.scene, collision.point);
         let path = collision.path as usize;
         let slot = self.paths.slot[path] as usize;
-        let (draw, time) = (self.slots.draw(slot), self.slots.time[slot]);
+        let (numbers, time) = (self.slots.numbers(slot), self.slots.time[slot]);
         let depth = self.paths.depth[path] & !SCATTERED;
-        let (choose, u) = (draw.light_choice(depth), draw.light_point(depth));
+        let (choose, u) = (numbers.light_choice(depth), numbers.light_point(depth));
         let sampling = match setting.strategy {
             Strategy::Lights => Sampling::LightsOnly,
             Strategy::Both | Strategy::Bsdf => Sampling::Mis,
@@ -152,14 +152,14 @@ impl<'s> Wave<'s> {
             (Scatter::Density(pdf), Strategy::Lights) => (1.0, pdf),
             (Scatter::Density(_), Strategy::Bsdf) => (0.0, 1.0),
         };
-        let light = self.paths.throughput(path) * sample.radiance * (phase * weight / pdf);
-        let is_light = !light.is_black() && weight > 0.0;
-        let (way, end) = match sample.end {
+        let contribution = self.paths.throughput(path) * sample.radiance * (phase * weight / pdf);
+        let is_light = !contribution.is_black() && weight > 0.0;
+        let (to_light, end) = match sample.end {
             None => (sample.towards, f64::INFINITY),
             Some(end) => (stop(setting, is_single, &end, sample.towards) - from, NEARLY_WHOLE),
         };
         if let Some(traced) = traced {
-            let ray = is_light.then(|| Ray::new(from, way).with_range(0.0, end));
+            let ray = is_light.then(|| Ray::new(from, to_light).with_range(0.0, end));
             traced.collision_light(sample, Spectrum::splat(phase), phase, weight, ray);
         }
         if !is_light {
@@ -172,9 +172,9 @@ impl<'s> Wave<'s> {
         self.shadows.push_one(&OneSegment {
             slot: slot as u32,
             origin: from,
-            way,
+            to_light,
             end,
-            light,
+            contribution,
             medium: collision.medium.0,
         });
     }
@@ -187,20 +187,20 @@ impl<'s> Wave<'s> {
     ) {
         let path = collision.path as usize;
         let slot = self.paths.slot[path] as usize;
-        let draw = self.slots.draw(slot);
+        let numbers = self.slots.numbers(slot);
         let vertex = self.paths.depth[path] & !SCATTERED;
         let asymmetry = setting.scene.medium(collision.medium).asymmetry();
         let incoming = self.paths.direction(path);
-        let (along, pdf) = sample_henyey_greenstein(incoming, asymmetry, draw.direction(vertex));
+        let (along, pdf) = sample_henyey_greenstein(incoming, asymmetry, numbers.direction(vertex));
         let (mut throughput, eta_scale) = (self.paths.throughput(path), self.paths.eta_scale[path]);
         let depth = vertex + 1;
-        let likely = throughput.max_component() * eta_scale;
-        let risky = setting.roulette_start < depth && likely < 1.0;
-        let survives = !risky || draw.survival(vertex) < likely;
-        if risky {
-            throughput = throughput / likely;
+        let survival = throughput.max_component() * eta_scale;
+        let plays_roulette = setting.roulette_start < depth && survival < 1.0;
+        let survives = !plays_roulette || numbers.survival(vertex) < survival;
+        if plays_roulette {
+            throughput = throughput / survival;
         }
-        let merging = setting.merging.as_ref().map_or(f32::INFINITY, |merging| {
+        let merge_pdf = setting.merging.as_ref().map_or(f32::INFINITY, |merging| {
             let radius = merging.radius_in_medium(self.slots.widths[slot], collision.width);
             pdf * merging.share_in_medium(merging.spread_in_medium(radius))
         });
@@ -208,18 +208,18 @@ impl<'s> Wave<'s> {
             slot: slot as u32,
             origin: collision.point,
             // Light arrives from every side.
-            receiver: Vec3::ZERO,
+            receiver_normal: Vec3::ZERO,
             direction: along.normalize(),
             throughput,
             eta_scale,
             pdf,
-            merging,
+            merge_pdf,
             depth: depth | SCATTERED,
             width: collision.width,
             spread: self.paths.spread[path],
         };
         if let Some(traced) = traced {
-            traced.collision_scattered(&next, risky.then_some((likely, survives)));
+            traced.collision_scattered(&next, plays_roulette.then_some((survival, survives)));
         }
         if survives {
             self.next.push_one(&next);

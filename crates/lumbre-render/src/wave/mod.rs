@@ -15,11 +15,11 @@ mod media;
 mod merge;
 mod pairs;
 pub(crate) mod paths;
+mod primary_hits;
 mod search;
 pub(crate) mod setting;
 mod shade;
 mod shadows;
-mod sights;
 mod smooth;
 mod surfaces;
 mod traced;
@@ -38,9 +38,9 @@ use lumbre_shading::lanes::{
 use lumbre_simd::{InstructionSet, Real};
 
 pub(crate) use paths::SampleId;
+pub use primary_hits::PrimaryHits;
+pub(crate) use primary_hits::cone;
 pub(crate) use search::Precision;
-pub use sights::PrimaryHits;
-pub(crate) use sights::cone;
 
 use crate::transport::Record;
 use crate::transport::journal::{End, Event, Source};
@@ -50,7 +50,7 @@ use crate::wave::flat::FlatHits;
 use crate::wave::pairs::{Merge, MergeKind, Merges};
 use crate::wave::paths::{Collision, OnePath, Paths, Slots};
 use crate::wave::search::Hits;
-use crate::wave::setting::{Found, Leg, Setting};
+use crate::wave::setting::{Found, Setting, TerminatorSegment};
 use crate::wave::shade::{Kind, Shade, ShadeKind};
 use crate::wave::shadows::Shadows;
 use crate::wave::smooth::SmoothHits;
@@ -76,7 +76,7 @@ pub(crate) struct Wave<'s> {
     vertices: Vertices<'s>,
     found: Vec<Found>,
     shadows: Shadows<'s>,
-    legs: Vec<Leg>,
+    terminator_segments: Vec<TerminatorSegment>,
     crossings: Vec<u32>,
     /// Paths that scattered inside solids before they reached a surface.
     collided: Vec<OnePath>,
@@ -99,12 +99,12 @@ impl<'s> Wave<'s> {
         loop {
             self.cross_media(setting, record);
             self.escape(setting, record);
-            self.surfaces(setting, record);
+            self.make_vertices(setting, record);
             self.merge(setting, record);
             self.shade(setting, precision, traced.as_mut());
             self.cross_surfaces(setting);
-            self.light(setting, precision, traced.as_mut(), record);
-            self.walk_legs(setting.scene, record);
+            self.trace_shadows(setting, precision, traced.as_mut(), record);
+            self.test_terminator_segments(setting.scene, record);
             std::mem::swap(&mut self.paths, &mut self.next);
             if self.paths.len == 0 {
                 return;
@@ -117,25 +117,25 @@ impl<'s> Wave<'s> {
 
     /// Adds the light at infinity for rays that left the scene.
     fn escape(&mut self, setting: &Setting<'s>, record: &mut Record) {
-        self.others.clear();
+        self.escaped.clear();
         for path in 0..self.paths.len {
             let is_hidden = self.hides_background && self.paths.depth[path] == 0;
-            if self.hits.is_miss(path) && !self.is_taken(path) && !is_hidden {
-                self.others.push(path as u32);
+            if self.hits.is_miss(path) && !self.is_stopped_in_medium(path) && !is_hidden {
+                self.escaped.push(path as u32);
             }
         }
-        let count = self.others.len();
-        let Some(&last) = self.others.last() else { return };
+        let count = self.escaped.len();
+        let Some(&last) = self.escaped.last() else { return };
         record.note(|| Event::Left { ray: self.paths.ray(0, self.slots.time[0]) });
         // Vector loads read beyond the last element.
-        self.others.resize(count + paths::PAD, last);
+        self.escaped.resize(count + paths::PAD, last);
         for light in 0..setting.scene.lane_lights().infinite_count() {
             self.found.clear();
             setting.instruction_set.run(Escape {
                 setting,
                 slots: &self.slots,
                 paths: &self.paths,
-                queue: &self.others,
+                queue: &self.escaped,
                 count,
                 light,
                 found: &mut self.found,
@@ -164,10 +164,10 @@ impl<'s> Wave<'s> {
 
     /// The weight of light that a path hit without sampling it: see [`Setting::weight_of_found`].
     fn weight_of_found(&self, setting: &Setting<'s>, path: usize, light_pdf: f32) -> f32 {
-        let merged = self.paths.merging[path];
+        let merge_pdf = self.paths.merge_pdf[path];
         match &setting.merging {
-            Some(merging) if self.paths.pdf[path] == f32::INFINITY && merged < f32::INFINITY => {
-                merging.weight_of_found(merged, self.paths.origin(path), light_pdf)
+            Some(merging) if self.paths.pdf[path] == f32::INFINITY && merge_pdf < f32::INFINITY => {
+                merging.weight_of_found(merge_pdf, self.paths.origin(path), light_pdf)
             }
             _ => setting.weight_of_found(self.paths.pdf[path], light_pdf),
         }
@@ -177,7 +177,7 @@ impl<'s> Wave<'s> {
     fn shade(&mut self, setting: &Setting<'s>, precision: Precision, mut traced: Option<&mut Traced>) {
         let count = self.vertices.queues.iter().map(Vec::len).sum::<usize>() + self.collisions.len();
         self.next.len = 0;
-        self.legs.clear();
+        self.terminator_segments.clear();
         self.crossings.clear();
         self.next.reserve(count + self.collided.len());
         self.shadows.reset(count);
@@ -195,7 +195,7 @@ impl<'s> Wave<'s> {
                 queue,
                 count,
                 next: &mut self.next,
-                legs: &mut self.legs,
+                terminator_segments: &mut self.terminator_segments,
                 shadows: &mut self.shadows,
                 crossings: &mut self.crossings,
                 is_single: precision == Precision::Single,
@@ -229,26 +229,27 @@ impl<'s> Wave<'s> {
     }
 
     /// Adds the light of unoccluded light samples.
-    fn light(
+    fn trace_shadows(
         &mut self,
         setting: &Setting<'s>,
         precision: Precision,
         traced: Option<&mut Traced>,
         record: &mut Record,
     ) {
-        let mut share = Spectrum::BLACK;
+        let mut unoccluded = Spectrum::BLACK;
         let Self { shadows, slots, .. } = self;
-        shadows.resolve(setting, precision == Precision::Single, slots, record, |_, passes| share = passes);
+        shadows
+            .resolve(setting, precision == Precision::Single, slots, record, |_, passes| unoccluded = passes);
         if let Some(traced) = traced {
-            let light = if self.shadows.len > 0 { self.shadows.light(0) } else { Spectrum::BLACK };
-            traced.write(self.paths.throughput(0), self.slots.time[0], light, share, record);
+            let light = if self.shadows.len > 0 { self.shadows.contribution(0) } else { Spectrum::BLACK };
+            traced.write(self.paths.throughput(0), self.slots.time[0], light, unoccluded, record);
         }
     }
 
     /// Ends the paths whose rays are blocked before the smooth surface that they start on.
-    fn walk_legs(&mut self, scene: &Scene, record: &mut Record) {
+    fn test_terminator_segments(&mut self, scene: &Scene, record: &mut Record) {
         let mut ended = Vec::new();
-        for &Leg { ray, from } in &self.legs {
+        for &TerminatorSegment { ray, from } in &self.terminator_segments {
             let start = self.next.origin(ray as usize);
             let time = self.slots.time[self.next.slot[ray as usize] as usize];
             record.counts.shadow += 1;

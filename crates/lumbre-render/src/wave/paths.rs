@@ -129,7 +129,7 @@ impl Slots<'_> {
 
     /// The random numbers of a sample, for code that handles one path at a time.
     #[inline]
-    pub(crate) fn draw(&self, slot: usize) -> SampleNumbers {
+    pub(crate) fn numbers(&self, slot: usize) -> SampleNumbers {
         SampleNumbers::new(self.kind, [self.pixel[0][slot], self.pixel[1][slot]], self.index[slot])
     }
 
@@ -169,7 +169,7 @@ pub(crate) struct Paths {
     /// The origin of the ray, from which lights were sampled too.
     pub(crate) origin: [Vec<f64>; 3],
     /// The normal at the origin for which lights were sampled: see [`lumbre_scene::light::lanes::Receiver`].
-    pub(crate) receiver: [Vec<f32>; 3],
+    pub(crate) receiver_normal: [Vec<f32>; 3],
     /// Unit.
     pub(crate) direction: [Vec<f32>; 3],
     pub(crate) throughput: [Vec<f32>; 3],
@@ -180,7 +180,7 @@ pub(crate) struct Paths {
     /// For light found behind specular surfaces: the density of the direction before them, divided by the number of
     /// lines of a pass and by the area (in a medium: volume, per length) in which photons are collected there. Infinite
     /// if photons do not find that light.
-    pub(crate) merging: Vec<f32>,
+    pub(crate) merge_pdf: Vec<f32>,
     /// Bounces off surfaces, and [`SCATTERED`].
     pub(crate) depth: Vec<u32>,
     /// The width of the footprint at the origin, and its growth with distance: see [`lumbre_scene::Footprint::Cone`].
@@ -196,12 +196,12 @@ pub(crate) const SCATTERED: u32 = 1 << 31;
 pub(crate) struct Departure<R: Real> {
     pub(crate) slot: R::UInt,
     pub(crate) origin: V3<R::Double>,
-    pub(crate) receiver: V3<R>,
+    pub(crate) receiver_normal: V3<R>,
     pub(crate) direction: V3<R>,
     pub(crate) throughput: V3<R>,
     pub(crate) eta_scale: R,
     pub(crate) pdf: R,
-    pub(crate) merging: R,
+    pub(crate) merge_pdf: R,
     pub(crate) depth: R::UInt,
     pub(crate) width: R,
     pub(crate) spread: R,
@@ -212,12 +212,12 @@ pub(crate) struct Departure<R: Real> {
 pub(crate) struct OnePath {
     pub(crate) slot: u32,
     pub(crate) origin: DVec3,
-    pub(crate) receiver: Vec3,
+    pub(crate) receiver_normal: Vec3,
     pub(crate) direction: Vec3,
     pub(crate) throughput: Spectrum,
     pub(crate) eta_scale: f32,
     pub(crate) pdf: f32,
-    pub(crate) merging: f32,
+    pub(crate) merge_pdf: f32,
     pub(crate) depth: u32,
     pub(crate) width: f32,
     pub(crate) spread: f32,
@@ -240,11 +240,11 @@ impl Paths {
         self.reserve(len);
         self.len = len;
         self.slot[..len].iter_mut().zip(0..).for_each(|(to, slot)| *to = slot);
-        self.receiver.iter_mut().for_each(|column| column[..len].fill(0.0));
+        self.receiver_normal.iter_mut().for_each(|column| column[..len].fill(0.0));
         self.throughput.iter_mut().for_each(|column| column[..len].fill(1.0));
         self.eta_scale[..len].fill(1.0);
         self.pdf[..len].fill(f32::INFINITY);
-        self.merging[..len].fill(f32::INFINITY);
+        self.merge_pdf[..len].fill(f32::INFINITY);
         self.depth[..len].fill(0);
         self.width[..len].fill(0.0);
         self.spread[..len].fill(0.0);
@@ -288,12 +288,12 @@ impl Paths {
         OnePath {
             slot: self.slot[at],
             origin: self.origin(at),
-            receiver: self.receiver(at),
+            receiver_normal: self.receiver_normal(at),
             direction: self.direction(at),
             throughput: self.throughput(at),
             eta_scale: self.eta_scale[at],
             pdf: self.pdf[at],
-            merging: self.merging[at],
+            merge_pdf: self.merge_pdf[at],
             depth: self.depth[at],
             width: self.width[at],
             spread: self.spread[at],
@@ -305,7 +305,7 @@ impl Paths {
         for (column, x) in self.origin.iter_mut().zip(path.origin.to_array()) {
             column[at] = x;
         }
-        for (column, x) in self.receiver.iter_mut().zip(path.receiver.to_array()) {
+        for (column, x) in self.receiver_normal.iter_mut().zip(path.receiver_normal.to_array()) {
             column[at] = x;
         }
         for (column, x) in self.direction.iter_mut().zip(path.direction.to_array()) {
@@ -314,7 +314,7 @@ impl Paths {
         self.set_throughput(at, path.throughput);
         self.eta_scale[at] = path.eta_scale;
         self.pdf[at] = path.pdf;
-        self.merging[at] = path.merging;
+        self.merge_pdf[at] = path.merge_pdf;
         self.depth[at] = path.depth;
         self.width[at] = path.width;
         self.spread[at] = path.spread;
@@ -324,10 +324,11 @@ impl Paths {
     pub(crate) fn reserve(&mut self, len: usize) {
         grow(&mut self.slot, len);
         self.origin.iter_mut().for_each(|column| grow(column, len));
-        self.receiver.iter_mut().for_each(|column| grow(column, len));
+        self.receiver_normal.iter_mut().for_each(|column| grow(column, len));
         self.direction.iter_mut().for_each(|column| grow(column, len));
         self.throughput.iter_mut().for_each(|column| grow(column, len));
-        let f32s = [&mut self.eta_scale, &mut self.pdf, &mut self.merging, &mut self.width, &mut self.spread];
+        let f32s =
+            [&mut self.eta_scale, &mut self.pdf, &mut self.merge_pdf, &mut self.width, &mut self.spread];
         for column in f32s {
             grow(column, len);
         }
@@ -342,9 +343,9 @@ impl Paths {
         path.origin.x.compress_store(mask, &mut self.origin[0][to..]);
         path.origin.y.compress_store(mask, &mut self.origin[1][to..]);
         path.origin.z.compress_store(mask, &mut self.origin[2][to..]);
-        path.receiver.x.compress_store(mask, &mut self.receiver[0][to..]);
-        path.receiver.y.compress_store(mask, &mut self.receiver[1][to..]);
-        path.receiver.z.compress_store(mask, &mut self.receiver[2][to..]);
+        path.receiver_normal.x.compress_store(mask, &mut self.receiver_normal[0][to..]);
+        path.receiver_normal.y.compress_store(mask, &mut self.receiver_normal[1][to..]);
+        path.receiver_normal.z.compress_store(mask, &mut self.receiver_normal[2][to..]);
         path.direction.x.compress_store(mask, &mut self.direction[0][to..]);
         path.direction.y.compress_store(mask, &mut self.direction[1][to..]);
         path.direction.z.compress_store(mask, &mut self.direction[2][to..]);
@@ -353,7 +354,7 @@ impl Paths {
         path.throughput.z.compress_store(mask, &mut self.throughput[2][to..]);
         path.eta_scale.compress_store(mask, &mut self.eta_scale[to..]);
         path.pdf.compress_store(mask, &mut self.pdf[to..]);
-        path.merging.compress_store(mask, &mut self.merging[to..]);
+        path.merge_pdf.compress_store(mask, &mut self.merge_pdf[to..]);
         path.depth.compress_store(mask, &mut self.depth[to..]);
         path.width.compress_store(mask, &mut self.width[to..]);
         path.spread.compress_store(mask, &mut self.spread[to..]);
@@ -369,8 +370,8 @@ impl Paths {
         at(&self.origin, path)
     }
 
-    pub(crate) fn receiver(&self, path: usize) -> Vec3 {
-        Vec3::new(self.receiver[0][path], self.receiver[1][path], self.receiver[2][path])
+    pub(crate) fn receiver_normal(&self, path: usize) -> Vec3 {
+        Vec3::new(self.receiver_normal[0][path], self.receiver_normal[1][path], self.receiver_normal[2][path])
     }
 
     pub(crate) fn direction(&self, path: usize) -> Vec3 {

@@ -34,7 +34,7 @@ pub(crate) struct Setting<'s> {
 
 /// The first leg of a ray: from a face to the smooth surface over it, where the ray itself starts.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Leg {
+pub(crate) struct TerminatorSegment {
     /// The index of the ray.
     pub(crate) ray: u32,
     /// The origin of the leg.

@@ -13,10 +13,12 @@ use crate::transport::Strategy;
 use crate::transport::sampler::LaneNumbers;
 use crate::wave::lights::{at_wavelengths, pass_solids, push_panes};
 use crate::wave::paths::{Departure, Paths, SCATTERED, Slots};
-use crate::wave::setting::{Leg, Setting, power_heuristic};
+use crate::wave::setting::{Setting, TerminatorSegment, power_heuristic};
 use crate::wave::shadows::{NEARLY_WHOLE, Segment, Shadows};
 use crate::wave::traced::Traced;
-use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, Place, RISES, SIDED, Vertices, gather3, gather64};
+use crate::wave::vertices::{
+    FOLDS, HAS_TERMINATOR_OFFSET, LIT_FROM_BELOW, Place, SIDED, Vertices, gather3, gather64,
+};
 
 /// BSDFs of one kind, for any number of lanes.
 pub(crate) trait Kind {
@@ -34,7 +36,7 @@ pub(crate) struct Shade<'a, 's> {
     pub(crate) count: usize,
     pub(crate) next: &'a mut Paths,
     /// First legs of the rays of `next`.
-    pub(crate) legs: &'a mut Vec<Leg>,
+    pub(crate) terminator_segments: &'a mut Vec<TerminatorSegment>,
     pub(crate) shadows: &'a mut Shadows<'s>,
     /// Vertices whose paths cross the surface, in scenes with solids or media.
     pub(crate) crossings: &'a mut Vec<u32>,
@@ -77,7 +79,7 @@ impl<K: Kind> Job for ShadeKind<'_, '_, '_, K> {
 pub(super) struct Vertex<R: Real> {
     place: Place<R>,
     /// The normal for which lights are sampled.
-    receiver: V3<R>,
+    receiver_normal: V3<R>,
     /// The shading frame.
     s: V3<R>,
     t: V3<R>,
@@ -86,9 +88,9 @@ pub(super) struct Vertex<R: Real> {
     wo: V3<R>,
     folds: R::Mask,
     sided: R::Mask,
-    rises: R::Mask,
-    smooth: V3<R>,
-    risen: V3<R::Double>,
+    has_terminator_offset: R::Mask,
+    smooth_normal: V3<R>,
+    terminator_origin: V3<R::Double>,
 }
 
 /// f · |cos θ| for a direction, and the density with which the BSDF chooses it.
@@ -104,7 +106,7 @@ fn none<R: Real>() -> R::Mask {
 }
 
 #[inline(always)]
-fn alike<R: Real>(a: R::Mask, b: R::Mask) -> R::Mask {
+fn xnor<R: Real>(a: R::Mask, b: R::Mask) -> R::Mask {
     (a & b) | !(a | b)
 }
 
@@ -118,18 +120,30 @@ impl<R: Real> Vertex<R> {
     pub(super) fn new(vertices: &Vertices<'_>, at: R::UInt, towards: V3<R>) -> Self {
         let flags = R::UInt::gather(&vertices.flags, at);
         let folds = has::<R>(flags, FOLDS);
-        let rises = has::<R>(flags, RISES);
+        let has_terminator_offset = has::<R>(flags, HAS_TERMINATOR_OFFSET);
         let (s, n) = (gather3::<R>(&vertices.frame_s, at), gather3::<R>(&vertices.frame_n, at));
         let t = n.cross(s);
         let place = vertices.place(at);
-        let (mut smooth, mut risen) = (n, place.point);
-        if rises.any() {
-            smooth = gather3(&vertices.smooth, at);
-            risen = gather64::<R>(&vertices.risen, at);
+        let (mut smooth_normal, mut terminator_origin) = (n, place.point);
+        if has_terminator_offset.any() {
+            smooth_normal = gather3(&vertices.smooth_normal, at);
+            terminator_origin = gather64::<R>(&vertices.terminator_origin, at);
         }
         let wo = V3 { x: s.dot(towards), y: t.dot(towards), z: n.dot(towards) };
-        let receiver = place.normal.or_zero(!has::<R>(flags, LIT_FROM_BELOW));
-        Self { place, receiver, s, t, n, wo, folds, sided: has::<R>(flags, SIDED), rises, smooth, risen }
+        let receiver_normal = place.normal.or_zero(!has::<R>(flags, LIT_FROM_BELOW));
+        Self {
+            place,
+            receiver_normal,
+            s,
+            t,
+            n,
+            wo,
+            folds,
+            sided: has::<R>(flags, SIDED),
+            has_terminator_offset,
+            smooth_normal,
+            terminator_origin,
+        }
     }
 
     #[inline(always)]
@@ -152,7 +166,10 @@ impl<R: Real> Vertex<R> {
     #[inline(always)]
     fn stays(&self, wi: V3<R>, local: V3<R>) -> R::Mask {
         let below = self.place.normal.dot(wi).simd_le(R::zero());
-        self.rises & below & R::zero().simd_lt(self.smooth.dot(wi)) & self.on_side(local)
+        self.has_terminator_offset
+            & below
+            & R::zero().simd_lt(self.smooth_normal.dot(wi))
+            & self.on_side(local)
     }
 
     /// What the BSDF scatters to a world direction, directly and by folded directions.
@@ -165,10 +182,10 @@ impl<R: Real> Vertex<R> {
         }
         let above = R::zero().simd_lt(self.place.normal.dot(wi));
         let stays = self.stays(wi, local);
-        let own = !self.folds | alike::<R>(self.on_side(local), above | stays);
+        let own = !self.folds | xnor::<R>(self.on_side(local), above | stays);
         let mirrored = mirrored(wi, self.place.normal);
         let image = self.to_local(mirrored);
-        let folded = self.folds & alike::<R>(self.on_side(image), above) & !self.stays(mirrored, image);
+        let folded = self.folds & xnor::<R>(self.on_side(image), above) & !self.stays(mirrored, image);
         let (image_f, image_pdf) = bsdf.eval(self.wo, image);
         Scattered {
             f: f.or_zero(own) + image_f.or_zero(folded),
@@ -185,7 +202,7 @@ impl<R: Real> Vertex<R> {
         }
         let above = R::zero().simd_lt(self.place.normal.dot(direction));
         let stays = self.stays(direction, sample.wi);
-        let folds = self.folds & alike::<R>(above, sample.transmitted) & (sample.transmitted | !stays);
+        let folds = self.folds & xnor::<R>(above, sample.transmitted) & (sample.transmitted | !stays);
         V3::select(folds, mirrored(direction, self.place.normal), direction).normalize()
     }
 
@@ -193,11 +210,11 @@ impl<R: Real> Vertex<R> {
     #[inline(always)]
     fn start(&self, wi: V3<R>) -> (V3<R::Double>, R::Mask) {
         let start = self.place.start(wi);
-        if self.rises.none() {
+        if self.has_terminator_offset.none() {
             return (start, none::<R>());
         }
         let stays = self.folds & self.stays(wi, self.to_local(wi));
-        (select64::<R>(stays, self.risen, start), stays)
+        (select64::<R>(stays, self.terminator_origin, start), stays)
     }
 
     /// Whether a direction leads to the other side of the surface, and whether the BSDF transmits.
@@ -261,7 +278,7 @@ impl<'s> Shade<'_, 's> {
                 throughput: gather3(&paths.throughput, at),
                 vertex: Vertex::new(self.vertices, vertex_at, towards),
             };
-            let draw = LaneNumbers::<R> {
+            let numbers = LaneNumbers::<R> {
                 kind: self.setting.sampler,
                 pixel: [
                     R::UInt::gather(&self.slots.pixel[0], slot),
@@ -272,20 +289,26 @@ impl<'s> Shade<'_, 's> {
             let bsdf: B = self.vertices.rows.load(R::UInt::gather(&self.vertices.bsdf, vertex_at));
             let useful = lanes & !bsdf.is_delta();
             if useful.any() {
-                self.light(useful, &arrived, &bsdf, draw.light(arrived.depth));
+                self.sample_light(useful, &arrived, &bsdf, numbers.light(arrived.depth));
             }
-            self.scatter(lanes, &arrived, &bsdf, draw.scatter(arrived.depth));
+            self.scatter(lanes, &arrived, &bsdf, numbers.scatter(arrived.depth));
         }
     }
 
     /// Samples one light.
     #[inline(always)]
-    fn light<R: Real, B: LaneBsdf<R>>(&mut self, useful: R::Mask, arrived: &Arrived<R>, bsdf: &B, u: [R; 4]) {
+    fn sample_light<R: Real, B: LaneBsdf<R>>(
+        &mut self,
+        useful: R::Mask,
+        arrived: &Arrived<R>,
+        bsdf: &B,
+        u: [R; 4],
+    ) {
         let vertex = &arrived.vertex;
         let scene = self.setting.scene;
         let receiver = Receiver {
             from: vertex.place.start(vertex.place.normal),
-            normal: vertex.receiver,
+            normal: vertex.receiver_normal,
             time: self.setting.moves.then_some(R::Double::gather(&self.slots.time, arrived.slot)),
         };
         let sampling = match self.setting.strategy {
@@ -304,10 +327,10 @@ impl<'s> Shade<'_, 's> {
             Strategy::Bsdf => R::zero(),
         };
         let weight = R::select(light.delta, R::one(), weight);
-        let share = R::select(light.delta, R::one(), weight / light.pdf);
+        let weight_over_pdf = R::select(light.delta, R::one(), weight / light.pdf);
         let value = f * light.radiance;
-        let mut arriving = arrived.throughput * (value * share);
-        let found = useful & light.valid & is_light(value) & !share.simd_le(R::zero());
+        let mut arriving = arrived.throughput * (value * weight_over_pdf);
+        let found = useful & light.valid & is_light(value) & !weight_over_pdf.simd_le(R::zero());
         let (start, stays) = vertex.start(light.towards);
         let crosses = vertex.crosses(light.towards, !vertex.on_side(vertex.to_local(light.towards)));
         let through_panes = found & light.delta & R::Mask::splat(self.setting.has_panes);
@@ -323,9 +346,9 @@ impl<'s> Shade<'_, 's> {
         let segment = Segment {
             slot: arrived.slot,
             origin: start,
-            way: select64::<R>(infinite, light.towards.to_double(), end - start),
+            to_light: select64::<R>(infinite, light.towards.to_double(), end - start),
             end: R::Double::select(infinite, R::Double::splat(f64::INFINITY), R::Double::splat(NEARLY_WHOLE)),
-            light: arriving,
+            contribution: arriving,
         };
         if let Some(traced) = &mut self.traced {
             traced.light(found, &light, f, bsdf_pdf, weight, &segment);
@@ -342,7 +365,13 @@ impl<'s> Shade<'_, 's> {
         }
         self.shadows.push(found, &segment);
         if (found & stays).any() {
-            push_legs::<R>(&mut self.shadows.legs, first, found, found & stays, receiver.from);
+            push_terminator_segments::<R>(
+                &mut self.shadows.terminator_segments,
+                first,
+                found,
+                found & stays,
+                receiver.from,
+            );
         }
         if through_panes.any() {
             push_panes(self, first, found, through_panes, arrived.vertex_at, arrived.slot, crosses, &light);
@@ -374,33 +403,34 @@ impl<'s> Shade<'_, 's> {
         let goes_on = lanes & sample.valid & is_light(throughput);
 
         let depth = arrived.depth + R::UInt::splat(1);
-        let likely = throughput.max_component() * eta_scale;
-        let risky = R::UInt::splat(self.setting.roulette_start).simd_lt(depth) & likely.simd_lt(R::one());
-        let survives = goes_on & (!risky | u[3].simd_lt(likely));
-        throughput = V3::select(risky, throughput * likely.recip(), throughput);
+        let survival = throughput.max_component() * eta_scale;
+        let plays_roulette =
+            R::UInt::splat(self.setting.roulette_start).simd_lt(depth) & survival.simd_lt(R::one());
+        let survives = goes_on & (!plays_roulette | u[3].simd_lt(survival));
+        throughput = V3::select(plays_roulette, throughput * survival.recip(), throughput);
 
         let scattered = R::UInt::gather(&self.paths.depth, at) & R::UInt::splat(SCATTERED);
         let scattered = R::UInt::select(sample.delta, scattered, R::UInt::splat(SCATTERED));
         let (origin, stays) = vertex.start(direction);
-        let (mut receiver, mut merging) = (vertex.receiver, R::splat(f32::INFINITY));
+        let (mut receiver_normal, mut merge_pdf) = (vertex.receiver_normal, R::splat(f32::INFINITY));
         if self.setting.merging.is_some() {
-            (receiver, merging) = self.merging(arrived, sample.delta, pdf);
+            (receiver_normal, merge_pdf) = self.merge_pdf(arrived, sample.delta, pdf);
         }
         let path = Departure {
             slot: arrived.slot,
             origin,
-            receiver,
+            receiver_normal,
             direction,
             throughput,
             eta_scale,
             pdf,
-            merging,
+            merge_pdf,
             depth: depth | scattered,
             width: R::gather(&self.vertices.width, arrived.vertex_at),
             spread: R::gather(&self.vertices.spread, arrived.vertex_at),
         };
         if let Some(traced) = &mut self.traced {
-            traced.scattered(goes_on, risky, survives, likely, &sample, &path);
+            traced.scattered(goes_on, plays_roulette, survives, survival, &sample, &path);
         }
         if !survives.any() {
             return;
@@ -409,7 +439,7 @@ impl<'s> Shade<'_, 's> {
         self.next.push(survives, &path);
         if (survives & stays).any() {
             let from = vertex.place.start(vertex.place.normal);
-            push_legs::<R>(self.legs, first, survives, survives & stays, from);
+            push_terminator_segments::<R>(self.terminator_segments, first, survives, survives & stays, from);
         }
         if self.setting.has_solids || self.setting.has_media {
             let crosses = survives & vertex.crosses(direction, sample.transmitted);
@@ -422,21 +452,27 @@ impl Shade<'_, '_> {
     /// What a path keeps to weigh light that it finds against photons: the receiver of that light, and
     /// [`Paths::merging`]. Photons start at specular surfaces with light from every side.
     #[inline(always)]
-    fn merging<R: Real>(&self, arrived: &Arrived<R>, delta: R::Mask, pdf: R) -> (V3<R>, R) {
-        let Some(merging) = &self.setting.merging else { return (arrived.vertex.receiver, pdf) };
+    fn merge_pdf<R: Real>(&self, arrived: &Arrived<R>, delta: R::Mask, pdf: R) -> (V3<R>, R) {
+        let Some(merging) = &self.setting.merging else { return (arrived.vertex.receiver_normal, pdf) };
         let flags = R::UInt::gather(&self.paths.depth, arrived.at) & R::UInt::splat(SCATTERED);
         let has_scattered = !flags.simd_eq(R::UInt::splat(0));
         let width = R::gather(&self.vertices.width, arrived.vertex_at);
         let radius = radius::<R>(R::gather(&self.slots.widths, arrived.slot), width, has_scattered);
         let own = pdf * merging.spread(radius);
-        let receiver = arrived.vertex.receiver.or_zero(!delta);
-        (receiver, R::select(delta, R::gather(&self.paths.merging, arrived.at), own))
+        let receiver_normal = arrived.vertex.receiver_normal.or_zero(!delta);
+        (receiver_normal, R::select(delta, R::gather(&self.paths.merge_pdf, arrived.at), own))
     }
 }
 
 /// Records the first legs of rays for the lanes of `some`; those of `all` were appended from `first` on.
 #[inline(always)]
-fn push_legs<R: Real>(legs: &mut Vec<Leg>, first: usize, all: R::Mask, some: R::Mask, from: V3<R::Double>) {
+fn push_terminator_segments<R: Real>(
+    terminator_segments: &mut Vec<TerminatorSegment>,
+    first: usize,
+    all: R::Mask,
+    some: R::Mask,
+    from: V3<R::Double>,
+) {
     let (all, mut some) = (all.to_bitmask(), some.to_bitmask());
     let from = [from.x.to_lanes(), from.y.to_lanes(), from.z.to_lanes()];
     while some != 0 {
@@ -444,7 +480,7 @@ fn push_legs<R: Real>(legs: &mut Vec<Leg>, first: usize, all: R::Mask, some: R::
         some &= some - 1;
         let before = (all & ((1 << lane) - 1)).count_ones();
         let from = DVec3::new(from[0][lane], from[1][lane], from[2][lane]);
-        legs.push(Leg { ray: first as u32 + before, from });
+        terminator_segments.push(TerminatorSegment { ray: first as u32 + before, from });
     }
 }
 

@@ -11,7 +11,7 @@ use crate::transport::Record;
 use crate::transport::interior::MediumStack;
 use crate::transport::through::straight_on;
 use crate::wave::paths::{Slots, grow, of_column};
-use crate::wave::setting::{Leg, Setting};
+use crate::wave::setting::{Setting, TerminatorSegment};
 
 /// Shadow segments, in columns.
 #[derive(Debug, Default)]
@@ -20,15 +20,15 @@ pub(crate) struct Shadows<'s> {
     pub(crate) slot: Vec<u32>,
     pub(crate) origin: [Vec<f64>; 3],
     /// To the light, or, where [`Shadows::end`] is infinite, the unit direction of one that is infinitely far away.
-    pub(crate) way: [Vec<f64>; 3],
+    pub(crate) to_light: [Vec<f64>; 3],
     /// The end of a segment along its way.
     pub(crate) end: Vec<f64>,
     /// What the path receives if the segment is unoccluded.
-    pub(crate) light: [Vec<f32>; 3],
+    pub(crate) contribution: [Vec<f32>; 3],
     /// The medium at the start of a segment, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
     /// First legs of segments.
-    pub(crate) legs: Vec<Leg>,
+    pub(crate) terminator_segments: Vec<TerminatorSegment>,
     /// Segments that pass through panes.
     pub(crate) panes: Vec<Pane<'s>>,
     rays: Vec<Ray>,
@@ -54,9 +54,9 @@ pub(crate) struct Pane<'s> {
 pub(crate) struct Segment<R: Real> {
     pub(crate) slot: R::UInt,
     pub(crate) origin: V3<R::Double>,
-    pub(crate) way: V3<R::Double>,
+    pub(crate) to_light: V3<R::Double>,
     pub(crate) end: R::Double,
-    pub(crate) light: V3<R>,
+    pub(crate) contribution: V3<R>,
 }
 
 /// One segment: see [`Shadows`].
@@ -64,9 +64,9 @@ pub(crate) struct Segment<R: Real> {
 pub(crate) struct OneSegment {
     pub(crate) slot: u32,
     pub(crate) origin: DVec3,
-    pub(crate) way: DVec3,
+    pub(crate) to_light: DVec3,
     pub(crate) end: f64,
-    pub(crate) light: Spectrum,
+    pub(crate) contribution: Spectrum,
     pub(crate) medium: u32,
 }
 
@@ -77,12 +77,12 @@ impl<'s> Shadows<'s> {
     /// Clears the columns and reserves `len` segments.
     pub(crate) fn reset(&mut self, len: usize) {
         self.len = 0;
-        self.legs.clear();
+        self.terminator_segments.clear();
         self.panes.clear();
         grow(&mut self.slot, len);
-        let f64s = self.origin.iter_mut().chain(&mut self.way).chain([&mut self.end]);
+        let f64s = self.origin.iter_mut().chain(&mut self.to_light).chain([&mut self.end]);
         f64s.for_each(|column| grow(column, len));
-        let f32s = self.light.iter_mut().chain(&mut self.direction).chain([&mut self.t_max]);
+        let f32s = self.contribution.iter_mut().chain(&mut self.direction).chain([&mut self.t_max]);
         f32s.for_each(|column| grow(column, len));
         grow(&mut self.medium, len);
     }
@@ -94,9 +94,9 @@ impl<'s> Shadows<'s> {
         self.slot[at] = segment.slot;
         for axis in 0..3 {
             self.origin[axis][at] = segment.origin[axis];
-            self.way[axis][at] = segment.way[axis];
-            self.direction[axis][at] = segment.way[axis] as f32;
-            self.light[axis][at] = segment.light[axis];
+            self.to_light[axis][at] = segment.to_light[axis];
+            self.direction[axis][at] = segment.to_light[axis] as f32;
+            self.contribution[axis][at] = segment.contribution[axis];
         }
         (self.end[at], self.t_max[at]) = (segment.end, segment.end as f32);
         self.medium[at] = segment.medium;
@@ -110,24 +110,28 @@ impl<'s> Shadows<'s> {
         segment.origin.x.compress_store(mask, &mut self.origin[0][to..]);
         segment.origin.y.compress_store(mask, &mut self.origin[1][to..]);
         segment.origin.z.compress_store(mask, &mut self.origin[2][to..]);
-        segment.way.x.compress_store(mask, &mut self.way[0][to..]);
-        segment.way.y.compress_store(mask, &mut self.way[1][to..]);
-        segment.way.z.compress_store(mask, &mut self.way[2][to..]);
+        segment.to_light.x.compress_store(mask, &mut self.to_light[0][to..]);
+        segment.to_light.y.compress_store(mask, &mut self.to_light[1][to..]);
+        segment.to_light.z.compress_store(mask, &mut self.to_light[2][to..]);
         segment.end.compress_store(mask, &mut self.end[to..]);
-        let direction: V3<R> = segment.way.to_single();
+        let direction: V3<R> = segment.to_light.to_single();
         direction.x.compress_store(mask, &mut self.direction[0][to..]);
         direction.y.compress_store(mask, &mut self.direction[1][to..]);
         direction.z.compress_store(mask, &mut self.direction[2][to..]);
         segment.end.to_single().compress_store(mask, &mut self.t_max[to..]);
-        segment.light.x.compress_store(mask, &mut self.light[0][to..]);
-        segment.light.y.compress_store(mask, &mut self.light[1][to..]);
-        segment.light.z.compress_store(mask, &mut self.light[2][to..]);
+        segment.contribution.x.compress_store(mask, &mut self.contribution[0][to..]);
+        segment.contribution.y.compress_store(mask, &mut self.contribution[1][to..]);
+        segment.contribution.z.compress_store(mask, &mut self.contribution[2][to..]);
         self.len += mask.count();
     }
 
     /// What a segment brings if unoccluded.
-    pub(crate) fn light(&self, segment: usize) -> Spectrum {
-        Spectrum::new(self.light[0][segment], self.light[1][segment], self.light[2][segment])
+    pub(crate) fn contribution(&self, segment: usize) -> Spectrum {
+        Spectrum::new(
+            self.contribution[0][segment],
+            self.contribution[1][segment],
+            self.contribution[2][segment],
+        )
     }
 
     /// The ray along a segment.
@@ -135,7 +139,7 @@ impl<'s> Shadows<'s> {
         let at = |columns: &[Vec<f64>; 3]| {
             DVec3::new(columns[0][segment], columns[1][segment], columns[2][segment])
         };
-        Ray::new(at(&self.origin), at(&self.way)).with_range(0.0, self.end[segment]).at_time(time)
+        Ray::new(at(&self.origin), at(&self.to_light)).with_range(0.0, self.end[segment]).at_time(time)
     }
 
     /// Adds to each path the light that arrives, and reports the unoccluded share of each segment.
@@ -150,13 +154,13 @@ impl<'s> Shadows<'s> {
         let scene = setting.scene;
         record.counts.shadow += (self.len - self.panes.len()) as u64;
         self.search(scene, is_single, slots);
-        for &Leg { ray: segment, from } in &self.legs {
+        for &TerminatorSegment { ray: segment, from } in &self.terminator_segments {
             let segment = segment as usize;
             if !self.blocked[segment] {
                 let ray = self.ray(segment, slots.time[self.slot[segment] as usize]);
-                let leg = Ray::new(from, ray.origin - from).with_range(0.0, 1.0).at_time(ray.time);
+                let before = Ray::new(from, ray.origin - from).with_range(0.0, 1.0).at_time(ray.time);
                 record.counts.shadow += 1;
-                self.blocked[segment] = scene.is_occluded(&leg);
+                self.blocked[segment] = scene.is_occluded(&before);
             }
         }
         let mut panes = std::mem::take(&mut self.panes);
@@ -178,12 +182,12 @@ impl<'s> Shadows<'s> {
             if setting.has_media && !passes.is_black() {
                 let slot = self.slot[i] as usize;
                 let ray = self.ray(i, slots.time[slot]);
-                let seed = slots.draw(slot).along(&ray);
+                let seed = slots.numbers(slot).along(&ray);
                 let wavelengths = slots.wavelengths.get(slot);
                 passes *= scene.transmittance(of_column(self.medium[i]), &ray, seed, wavelengths);
             }
             if !passes.is_black() {
-                slots.radiance[self.slot[i] as usize] += self.light(i) * passes;
+                slots.radiance[self.slot[i] as usize] += self.contribution(i) * passes;
             }
             resolved(i, passes);
         }

@@ -11,7 +11,7 @@ use crate::wave::flat::{FlatHits, corner, find_light, put_corners, put3, put64, 
 use crate::wave::paths::{Paths, grow};
 use crate::wave::search::MetTriangle;
 use crate::wave::setting::{Found, Setting};
-use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW, Place, RISES, SIDED, Vertices, gather3};
+use crate::wave::vertices::{FOLDS, HAS_TERMINATOR_OFFSET, LIT_FROM_BELOW, Place, SIDED, Vertices, gather3};
 
 /// Triangles that paths met and that need more than [`FlatHits`], in columns.
 #[derive(Debug, Default)]
@@ -150,19 +150,18 @@ impl Job for SmoothVertices<'_, '_> {
             flags = flags | flag_where::<R>(differs & is_pbrt, SIDED | LIT_FROM_BELOW);
             let is_textured = R::UInt::from_slice(&hits.is_textured[done..]).simd_eq(R::UInt::splat(1));
             // If the frame may still be tilted, the texture look-up decides.
-            let has_terminator_offset =
-                lanes & differ::<R>(shading, geometric) & (folds | (is_textured & !is_pbrt));
+            let may_rise = lanes & differ::<R>(shading, geometric) & (folds | (is_textured & !is_pbrt));
             let to = vertices.len + done;
-            if has_terminator_offset.any() {
+            if may_rise.any() {
                 let start = place.start(above);
-                let (offset, rises) = rise::<R>(hits, done, above);
+                let (offset, is_above) = terminator_offset::<R>(hits, done, above);
                 // A smaller offset is within the error of the point.
                 let least = (start - point).to_single().length();
-                let rises = has_terminator_offset & rises & least.simd_lt(offset.dot(geometric).abs());
+                let is_above = may_rise & is_above & least.simd_lt(offset.dot(geometric).abs());
                 let is_below = shading.dot(above).simd_lt(R::zero());
-                put3::<R>(&mut vertices.smooth, to, V3::select(is_below, -shading, shading));
-                put64::<R>(&mut vertices.risen, to, start + offset.to_double());
-                flags = flags | flag_where::<R>(rises, RISES | LIT_FROM_BELOW);
+                put3::<R>(&mut vertices.smooth_normal, to, V3::select(is_below, -shading, shading));
+                put64::<R>(&mut vertices.terminator_origin, to, start + offset.to_double());
+                flags = flags | flag_where::<R>(is_above, HAS_TERMINATOR_OFFSET | LIT_FROM_BELOW);
             }
 
             let (s, _) = orthonormal_basis(n);
@@ -242,7 +241,7 @@ fn normals_at<R: Real>(hits: &SmoothHits, at: usize, face: V3<R>, outward: R) ->
 /// The offset from a triangle to the smooth surface that its vertex normals imply on the side of `above`, and where
 /// that is above the triangle: as the terminator offset of [`lumbre_scene::Interaction`].
 #[inline(always)]
-fn rise<R: Real>(hits: &SmoothHits, at: usize, above: V3<R>) -> (V3<R>, R::Mask) {
+fn terminator_offset<R: Real>(hits: &SmoothHits, at: usize, above: V3<R>) -> (V3<R>, R::Mask) {
     let [b0, b1, b2] = weights::<R>(hits, at);
     let (p0, p1, p2) =
         (corner::<R>(&hits.base, at, 0), corner::<R>(&hits.base, at, 3), corner::<R>(&hits.base, at, 6));
@@ -259,8 +258,8 @@ fn rise<R: Real>(hits: &SmoothHits, at: usize, above: V3<R>) -> (V3<R>, R::Mask)
     let (offset2, over2) = lift(n2 * side, from_first - along_b, b2, above);
     let offset = offset0 + offset1 + offset2;
     let height = offset.dot(above);
-    let rises = is0 & is1 & is2 & over0 & over1 & over2;
-    (offset, rises & R::zero().simd_lt(height) & height.is_finite())
+    let is_above = is0 & is1 & is2 & over0 & over1 & over2;
+    (offset, is_above & R::zero().simd_lt(height) & height.is_finite())
 }
 
 /// How far the tangent plane of a vertex lifts a point at distance `way`, times its weight, and whether the vertex

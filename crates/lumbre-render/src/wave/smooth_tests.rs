@@ -18,7 +18,7 @@ use lumbre_simd::InstructionSet;
 
 use crate::transport::{Record, Sampler, Strategy};
 use crate::wave::setting::Setting;
-use crate::wave::vertices::{FOLDS, RISES, SIDED};
+use crate::wave::vertices::{FOLDS, HAS_TERMINATOR_OFFSET, SIDED};
 use crate::wave::{Precision, PrimaryHits, SampleId, Wave};
 
 const SIDE: u32 = 48;
@@ -139,13 +139,14 @@ fn first_vertices<'s>(
     let sampler = Sampler::new(&SamplerDesc { kind: SamplerKind::Sobol, spp: None, seed: 3 });
     let ids: Vec<_> = (0..SIDE * SIDE).map(|i| SampleId { x: i % SIDE, y: i / SIDE, index: 0 }).collect();
     let (mut wave, mut record) = (Wave::default(), Record::default());
-    let mut sights = PrimaryHits::start(scene, &view, &mut wave, Precision::Single, &sampler, &ids, None);
+    let mut primary_hits =
+        PrimaryHits::start(scene, &view, &mut wave, Precision::Single, &sampler, &ids, None);
     for (slot, id) in ids.iter().enumerate() {
         let film = DVec2::new(f64::from(id.x) + 0.37, f64::from(id.y) + 0.61);
-        sights.set_ray(slot, &view.ray(film, DVec2::splat(0.5), 0.0, 0.25));
+        primary_hits.set_ray(slot, &view.ray(film, DVec2::splat(0.5), 0.0, 0.25));
     }
-    sights.search(&mut record);
-    wave.surfaces(&setting, &mut record);
+    primary_hits.search(&mut record);
+    wave.make_vertices(&setting, &mut record);
     wave
 }
 
@@ -175,14 +176,19 @@ fn compare(material: Material, reverse: bool, shading_normals: ShadingNormals) -
             assert!((vector(&a.frame_s, i) - vector(&b.frame_s, i)).length() < 1e-4);
         }
         folds += usize::from(a.flags[i] & (FOLDS | SIDED) != 0);
-        rises += usize::from(a.flags[i] & RISES != 0);
+        rises += usize::from(a.flags[i] & HAS_TERMINATOR_OFFSET != 0);
         others += usize::from(a.flags[i] != b.flags[i]);
-        if a.flags[i] & b.flags[i] & RISES != 0 {
-            assert!((vector(&a.smooth, i) - vector(&b.smooth, i)).length() < 2e-6);
-            let risen = |v: &crate::wave::vertices::Vertices<'_>| {
-                DVec3::new(v.risen[0][i], v.risen[1][i], v.risen[2][i])
+        if a.flags[i] & b.flags[i] & HAS_TERMINATOR_OFFSET != 0 {
+            assert!((vector(&a.smooth_normal, i) - vector(&b.smooth_normal, i)).length() < 2e-6);
+            let terminator_origin = |v: &crate::wave::vertices::Vertices<'_>| {
+                DVec3::new(v.terminator_origin[0][i], v.terminator_origin[1][i], v.terminator_origin[2][i])
             };
-            assert!((risen(a) - risen(b)).length() < 2e-7, "{} {}", risen(a), risen(b));
+            assert!(
+                (terminator_origin(a) - terminator_origin(b)).length() < 2e-7,
+                "{} {}",
+                terminator_origin(a),
+                terminator_origin(b)
+            );
         }
         let kind = (0..a.queues.len()).find(|&kind| a.queues[kind].contains(&(i as u32)));
         assert_eq!(kind, (0..b.queues.len()).find(|&kind| b.queues[kind].contains(&(i as u32))));
@@ -222,8 +228,9 @@ fn vertices_have_the_same_bits_at_every_instruction_set() {
             assert_eq!((a.point(i), a.offset[i], a.flags[i]), (b.point(i), b.offset[i], b.flags[i]));
             let vectors = [(&a.normal, &b.normal), (&a.frame_s, &b.frame_s), (&a.frame_n, &b.frame_n)];
             assert!(vectors.iter().all(|(a, b)| vector(a, i) == vector(b, i)));
-            if a.flags[i] & RISES != 0 {
-                assert!((0..3).all(|k| a.risen[k][i] == b.risen[k][i] && a.smooth[k][i] == b.smooth[k][i]));
+            if a.flags[i] & HAS_TERMINATOR_OFFSET != 0 {
+                assert!((0..3).all(|k| a.terminator_origin[k][i] == b.terminator_origin[k][i]
+                    && a.smooth_normal[k][i] == b.smooth_normal[k][i]));
             }
         }
     }

@@ -27,7 +27,7 @@ const MAX_COLLISIONS: u32 = 1 << 14;
 
 impl<'s> Wave<'s> {
     /// Makes the vertices of all paths that hit something, queues those that scatter, and adds emission.
-    pub(super) fn surfaces(&mut self, setting: &Setting<'s>, record: &mut Record) {
+    pub(super) fn make_vertices(&mut self, setting: &Setting<'s>, record: &mut Record) {
         let scene = setting.scene;
         self.vertices.reset(self.paths.len, scene.tables().rows());
         self.flat.reset(self.paths.len);
@@ -35,10 +35,10 @@ impl<'s> Wave<'s> {
         self.found.clear();
         self.collided.clear();
         let takes_triangles = !setting.regularize;
-        let mut others = std::mem::take(&mut self.others);
-        others.clear();
+        let mut not_in_lanes = std::mem::take(&mut self.not_in_lanes);
+        not_in_lanes.clear();
         for path in 0..self.paths.len {
-            if self.hits.is_miss(path) || self.is_taken(path) {
+            if self.hits.is_miss(path) || self.is_stopped_in_medium(path) {
                 continue;
             }
             let in_the_open =
@@ -46,7 +46,7 @@ impl<'s> Wave<'s> {
             let met = if takes_triangles && in_the_open { self.hits.triangle(path) } else { None };
             let surface = met.and_then(|met| Some((scene.tables().surface(met.id)?, met)));
             let Some((surface, met)) = surface else {
-                others.push(path as u32);
+                not_in_lanes.push(path as u32);
                 continue;
             };
             let distance = self.hits.distance(path);
@@ -63,7 +63,7 @@ impl<'s> Wave<'s> {
                 _ => self.smooth.push(surface, path, met, distance, bsdf),
             }
             if record.journal.is_some() {
-                self.tell_triangle(setting, path, record);
+                self.note_triangle(setting, path, record);
             }
         }
         self.flat.load(scene.tables());
@@ -103,17 +103,17 @@ impl<'s> Wave<'s> {
             record.note(|| Event::Ended(End::Depth));
         }
         self.scatter_smooth(setting, record);
-        for &path in &others {
+        for &path in &not_in_lanes {
             let path = path as usize;
             let slot = self.paths.slot[path] as usize;
             let ray = self.paths.ray(path, self.slots.time[slot]);
             let footprint = self.footprint(path);
             if let Some(mut here) = self.hits.interaction(scene, path, &ray, &footprint) {
                 here.at.spectral = self.slots.spectral(slot);
-                self.surface(setting, path, slot, &ray, &here, record);
+                self.make_vertex(setting, path, slot, &ray, &here, record);
             }
         }
-        self.others = others;
+        self.not_in_lanes = not_in_lanes;
     }
 
     /// Queues the vertices of smooth hits, which follow the flat ones, and looks up textured materials.
@@ -177,7 +177,7 @@ impl<'s> Wave<'s> {
     }
 
     /// Records the triangle that a path met in the journal.
-    fn tell_triangle(&self, setting: &Setting<'s>, path: usize, record: &mut Record) {
+    fn note_triangle(&self, setting: &Setting<'s>, path: usize, record: &mut Record) {
         let ray = self.paths.ray(path, self.slots.time[self.paths.slot[path] as usize]);
         if let Some(here) = self.hits.interaction(setting.scene, path, &ray, &self.footprint(path)) {
             let (depth, throughput) = (self.paths.depth[path] & !SCATTERED, self.paths.throughput(path));
@@ -185,7 +185,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    fn surface(
+    fn make_vertex(
         &mut self,
         setting: &Setting<'s>,
         path: usize,
@@ -253,12 +253,12 @@ impl<'s> Wave<'s> {
             self.vertices.put_media(self.vertices.len - 1, media);
         }
         if flags & FOLDS != 0
-            && let Some(risen) = here.terminator_origin()
+            && let Some(terminator_origin) = here.terminator_origin()
         {
             let (smooth, geometric) = (here.shading.normal, here.shading.geometric);
             let on_its_side = if here.front { geometric } else { -geometric };
             let smooth = if smooth.dot(on_its_side) < 0.0 { -smooth } else { smooth };
-            self.vertices.put_risen(smooth, risen);
+            self.vertices.put_terminator_origin(smooth, terminator_origin);
             flags |= LIT_FROM_BELOW;
         }
         if material.is_solid() {
@@ -290,7 +290,7 @@ impl<'s> Wave<'s> {
     ) -> bool {
         let normal = here.surface.normal;
         let cos = here.towards_origin.dot(normal);
-        let u = self.slots.draw(slot).scattered(self.slots.distance_samples[slot]);
+        let u = self.slots.numbers(slot).scattered(self.slots.distance_samples[slot]);
         self.slots.distance_samples[slot] += 1;
         if u.x >= body.reflected_inside(cos as f32) {
             return false;
@@ -306,12 +306,12 @@ impl<'s> Wave<'s> {
         self.collided.push(OnePath {
             slot: slot as u32,
             origin: here.surface.offset_origin(along),
-            receiver: Vec3::ZERO,
+            receiver_normal: Vec3::ZERO,
             direction: along.as_vec3().normalize(),
             throughput,
             eta_scale: self.paths.eta_scale[path],
             pdf: f32::INFINITY,
-            merging: f32::INFINITY,
+            merge_pdf: f32::INFINITY,
             depth: self.paths.depth[path] | SCATTERED,
             width: width as f32,
             spread: spread as f32,
@@ -336,7 +336,7 @@ impl<'s> Wave<'s> {
         if let (Some(wavelengths), Some(emission)) = (self.slots.wavelengths.get(slot), here.emission) {
             emitted = emission.at_wavelengths(emitted, wavelengths);
         }
-        let matters = self.paths.pdf[path].min(self.paths.merging[path]) < f32::INFINITY;
+        let matters = self.paths.pdf[path].min(self.paths.merge_pdf[path]) < f32::INFINITY;
         let pdf = if matters { self.light_pdf(setting, path, ray, here) } else { 0.0 };
         let weight = self.weight_of_found(setting, path, pdf);
         let throughput = self.paths.throughput(path);
@@ -346,7 +346,7 @@ impl<'s> Wave<'s> {
     /// The density with which the last vertex would have sampled what a path hit: as the lanes compute it for a
     /// triangle.
     fn light_pdf(&self, setting: &Setting<'s>, path: usize, ray: &Ray, here: &Interaction<'s>) -> f32 {
-        let (scene, normal) = (setting.scene, self.paths.receiver(path));
+        let (scene, normal) = (setting.scene, self.paths.receiver_normal(path));
         let Some(met) = self.hits.triangle(path).filter(|_| here.light.is_some()) else {
             return scene.light_pdf(ray.origin, normal.as_dvec3(), here);
         };
@@ -379,7 +379,7 @@ impl<'s> Wave<'s> {
             }
             return true;
         };
-        let u = self.slots.draw(slot).distance(self.slots.distance_samples[slot]);
+        let u = self.slots.numbers(slot).distance(self.slots.distance_samples[slot]);
         match medium.sample_distance(throughput, way, u) {
             DistanceSample::Through(weight) => {
                 let throughput = throughput * weight;
@@ -411,20 +411,20 @@ impl<'s> Wave<'s> {
         record: &mut Record,
     ) {
         let eta_scale = self.paths.eta_scale[path];
-        let likely = (throughput * eta_scale).max_component();
-        let (draw, sample) = (self.slots.draw(slot), self.slots.distance_samples[slot]);
-        if self.slots.collisions[slot] >= MAX_COLLISIONS || likely <= 0.0 {
+        let survival = (throughput * eta_scale).max_component();
+        let (numbers, sample) = (self.slots.numbers(slot), self.slots.distance_samples[slot]);
+        if self.slots.collisions[slot] >= MAX_COLLISIONS || survival <= 0.0 {
             return record.note(|| Event::Ended(End::Medium));
         }
-        if likely < 1.0 && self.slots.collisions[slot] >= ROULETTE_START_IN_MEDIA {
-            let survives = draw.survives_collision(sample) < likely;
-            record.note(|| Event::Roulette { probability: likely, survives });
+        if survival < 1.0 && self.slots.collisions[slot] >= ROULETTE_START_IN_MEDIA {
+            let survives = numbers.survives_collision(sample) < survival;
+            record.note(|| Event::Roulette { probability: survival, survives });
             if !survives {
                 return record.note(|| Event::Ended(End::Roulette));
             }
-            throughput *= 1.0 / likely;
+            throughput *= 1.0 / survival;
         }
-        let u = draw.scattered(sample);
+        let u = numbers.scattered(sample);
         let (along, _) = sample_henyey_greenstein(ray.direction.as_vec3(), medium.asymmetry, u);
         self.slots.distance_samples[slot] += 1;
         self.slots.collisions[slot] += 1;
@@ -432,13 +432,13 @@ impl<'s> Wave<'s> {
         self.collided.push(OnePath {
             slot: slot as u32,
             origin: ray.origin + distance * ray.direction,
-            receiver: Vec3::ZERO,
+            receiver_normal: Vec3::ZERO,
             direction: along.normalize(),
             throughput,
             eta_scale,
             // A refracting surface hides the lights: only paths find them.
             pdf: f32::INFINITY,
-            merging: f32::INFINITY,
+            merge_pdf: f32::INFINITY,
             depth: self.paths.depth[path] | SCATTERED,
             width: width as f32,
             spread: spread as f32,

@@ -56,7 +56,7 @@ impl Traced {
         if light.valid.to_bitmask() & 1 == 0 {
             return;
         }
-        let shadow_ray = Ray::new(first64::<R>(segment.origin), first64::<R>(segment.way))
+        let shadow_ray = Ray::new(first64::<R>(segment.origin), first64::<R>(segment.to_light))
             .with_range(0.0, segment.end.to_lanes()[0]);
         self.light = Some(TracedLight {
             sample: first_sample(light),
@@ -97,9 +97,9 @@ impl Traced {
     pub(crate) fn scattered<R: Real>(
         &mut self,
         goes_on: R::Mask,
-        risky: R::Mask,
+        plays_roulette: R::Mask,
         survives: R::Mask,
-        likely: R,
+        survival: R,
         sample: &LaneSample<R>,
         path: &Departure<R>,
     ) {
@@ -107,7 +107,7 @@ impl Traced {
         let pdf = path.pdf.to_lanes()[0];
         self.scattered = Some(TracedScatter {
             goes_on: is(goes_on),
-            roulette: is(risky).then(|| (likely.to_lanes()[0], is(survives))),
+            roulette: is(plays_roulette).then(|| (survival.to_lanes()[0], is(survives))),
             event: Scattered {
                 ray: Ray::new(first64::<R>(path.origin), first(path.direction).as_dvec3()),
                 weight: colour(sample.weight),
@@ -142,12 +142,15 @@ impl Traced {
                     passes,
                 }))
             });
-            let share = match sample.scatter {
+            let weight_over_pdf = match sample.scatter {
                 Scatter::Delta => weight,
                 Scatter::Density(pdf) => weight / pdf,
             };
-            let radiance =
-                if passes.is_black() { Spectrum::BLACK } else { f * sample.radiance * share * passes };
+            let radiance = if passes.is_black() {
+                Spectrum::BLACK
+            } else {
+                f * sample.radiance * weight_over_pdf * passes
+            };
             let added = if passes.is_black() { Spectrum::BLACK } else { light * passes };
             record.note(|| Event::Added {
                 source: Source::Sampled,

@@ -22,12 +22,12 @@ pub(crate) struct Vertices<'s> {
     /// The shading frame: its x and its z axis.
     pub(crate) frame_s: [Vec<f32>; 3],
     pub(crate) frame_n: [Vec<f32>; 3],
-    /// A combination of [`FOLDS`], [`SIDED`], [`RISES`] and [`LIT_FROM_BELOW`].
+    /// A combination of [`FOLDS`], [`SIDED`], [`HAS_TERMINATOR_OFFSET`] and [`LIT_FROM_BELOW`].
     pub(crate) flags: Vec<u32>,
-    /// Only with [`RISES`]: the shading normal before bump maps, on the side of the viewer, and the origin of rays that
+    /// Only with [`HAS_TERMINATOR_OFFSET`]: the shading normal before bump maps, on the side of the viewer, and the origin of rays that
     /// leave below the face but above the smooth surface.
-    pub(crate) smooth: [Vec<f32>; 3],
-    pub(crate) risen: [Vec<f64>; 3],
+    pub(crate) smooth_normal: [Vec<f32>; 3],
+    pub(crate) terminator_origin: [Vec<f64>; 3],
     /// Start of the BSDF's row in [`Vertices::rows`].
     pub(crate) bsdf: Vec<u32>,
     pub(crate) rows: Rows,
@@ -50,7 +50,7 @@ pub(crate) const FOLDS: u32 = 1;
 /// The shading normal is not the geometric one, which only decides the side of a direction, as in pbrt.
 pub(crate) const SIDED: u32 = 2;
 /// The mesh approximates a smooth surface above the face.
-pub(crate) const RISES: u32 = 4;
+pub(crate) const HAS_TERMINATOR_OFFSET: u32 = 4;
 
 /// Light from below the horizon counts: the surface transmits, or approximates a smooth one.
 pub(crate) const LIT_FROM_BELOW: u32 = 8;
@@ -104,9 +104,9 @@ impl<'s> Vertices<'s> {
     /// Clears the columns and reserves `len` vertices; `rows` are those of uniform materials.
     pub(crate) fn reset(&mut self, len: usize, rows: &Rows) {
         self.len = 0;
-        let f64s = self.point.iter_mut().chain(&mut self.risen).chain([&mut self.offset]);
+        let f64s = self.point.iter_mut().chain(&mut self.terminator_origin).chain([&mut self.offset]);
         f64s.for_each(|column| grow(column, len));
-        let vectors = [&mut self.normal, &mut self.frame_s, &mut self.frame_n, &mut self.smooth];
+        let vectors = [&mut self.normal, &mut self.frame_s, &mut self.frame_n, &mut self.smooth_normal];
         vectors.into_iter().flatten().for_each(|column| grow(column, len));
         for column in [&mut self.path, &mut self.flags, &mut self.bsdf] {
             grow(column, len);
@@ -147,8 +147,8 @@ impl<'s> Vertices<'s> {
     pub(crate) fn put_looked_up(&mut self, at: usize, frame: &ShadingFrame, bsdf: &Bsdf, flags: u32) {
         put(&mut self.frame_s, at, frame.s);
         put(&mut self.frame_n, at, frame.n);
-        let rises = flags & FOLDS != 0 && self.flags[at] & RISES != 0;
-        self.flags[at] = flags | if rises { RISES | LIT_FROM_BELOW } else { 0 };
+        let has_offset = flags & FOLDS != 0 && self.flags[at] & HAS_TERMINATOR_OFFSET != 0;
+        self.flags[at] = flags | if has_offset { HAS_TERMINATOR_OFFSET | LIT_FROM_BELOW } else { 0 };
         self.bsdf[at] = self.rows.push(bsdf);
         self.queue(at, bsdf.kind());
     }
@@ -164,11 +164,11 @@ impl<'s> Vertices<'s> {
     }
 
     /// Sets the origin of rays that leave the last vertex below the face.
-    pub(crate) fn put_risen(&mut self, smooth: Vec3, risen: DVec3) {
+    pub(crate) fn put_terminator_origin(&mut self, smooth_normal: Vec3, terminator_origin: DVec3) {
         let at = self.len - 1;
-        self.flags[at] |= RISES;
-        put(&mut self.smooth, at, smooth);
-        put64(&mut self.risen, at, risen);
+        self.flags[at] |= HAS_TERMINATOR_OFFSET;
+        put(&mut self.smooth_normal, at, smooth_normal);
+        put64(&mut self.terminator_origin, at, terminator_origin);
     }
 
     /// The solid of a vertex, and whether it was met from outside.

@@ -31,7 +31,7 @@ fn brightness(lens: &Lens, film: DVec2) -> f64 {
 }
 
 #[test]
-fn a_lens_in_focus_has_the_focal_length_and_the_place_of_its_surfaces() {
+fn a_focused_lens_has_the_focal_length_of_its_surfaces() {
     // By quadrature elsewhere.
     let lens = lens(10.0, 2.0);
     assert!((lens.focal_length() - 32.441e-3).abs() < 2e-6, "{}", lens.focal_length());
@@ -62,7 +62,7 @@ fn rays_from_a_point_of_the_film_meet_where_the_lens_is_focused() {
 }
 
 #[test]
-fn brightness_is_that_of_the_stop_as_far_as_its_rim_does_not_hide_it() {
+fn brightness_follows_the_unvignetted_stop() {
     // Of a sky of 1, by quadrature elsewhere: the middle of the film, and a corner, which is vignetted.
     let lens = lens(10.0, 2.0);
     let middle = brightness(&lens, DVec2::ZERO);

@@ -124,7 +124,7 @@ mod tests {
     use lumbre_math::random::RandomStream;
 
     #[test]
-    fn a_flight_collides_as_often_as_beer_and_lambert_say_in_every_lane() {
+    fn flights_collide_as_beer_lambert_says_in_every_lane() {
         let medium = HomogeneousMedium {
             extinction: Spectrum::new(0.5, 2.0, 0.0),
             albedo: Spectrum::new(0.9, 0.5, 0.3),
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn light_that_carries_nothing_goes_nowhere_and_dense_media_give_no_nan() {
+    fn black_light_stops_and_dense_media_give_no_nan() {
         let medium = HomogeneousMedium {
             extinction: Spectrum::new(1e30, 1e30, 0.0),
             albedo: Spectrum::WHITE,

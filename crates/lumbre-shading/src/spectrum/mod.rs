@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn every_built_in_spectrum_is_found_by_name_and_has_finite_values() {
+    fn built_in_spectra_are_found_by_name_and_finite() {
         let mut count = 0;
         for name in NamedSpectrum::names() {
             let spectrum = NamedSpectrum::from_name(name).unwrap();
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_reflectance_has_equal_channels_and_d65_is_white_light() {
+    fn constant_reflectance_is_grey_and_d65_is_white() {
         let grey = SpectrumValue::Sampled(vec![(500.0, 0.37)]);
         assert!(close(grey.reflectance_rgb(), [0.37; 3], 1e-6));
         assert!(close(grey.unbounded_rgb(), [0.37; 3], 1e-6));
@@ -398,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn light_by_wavelength_has_luminance_one_and_a_colour_stays_itself() {
+    fn spectral_light_has_luminance_one_and_colours_stay() {
         let mut count = 0;
         for kelvin in [900.0, 1500.0, 2700.0, 4000.0, 6500.0, 20_000.0] {
             let colour = SpectrumValue::Blackbody(kelvin).illuminant_rgb();

@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_records_as_much_as_the_integral_over_its_sensitivities() {
+    fn a_sensor_records_the_integral_of_its_sensitivities() {
         // Two triangles and a constant.
         let sensor = SensorCurves {
             sensitivities: [vec![0.0, 1.0, 0.0], vec![0.5; 3], vec![2.0, 0.0, 0.0]],

@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn patterns_lie_in_the_space_of_their_texture_and_are_filtered_there() {
+    fn patterns_are_filtered_in_texture_space() {
         let octaves = Octaves { count: 4, roughness: 0.7 };
         let (world, local) = (DVec3::new(3.5, 1.0, -2.0), DVec3::new(0.25, 1.5, -3.5));
         let sides = [DVec3::X * 0.05, DVec3::Y * 0.05];

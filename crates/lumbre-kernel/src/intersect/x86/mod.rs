@@ -19,7 +19,7 @@ use crate::intersect::triangles::Shears;
 use crate::intersect::watertight::{BlockRay, EdgeTest, FAR, HeightRange, Inside, ROUNDINGS, Shear};
 use crate::ray32::Ray32;
 use crate::simd::x86::{Avx2, Avx512, Eight256};
-use crate::simd::{self, F32x16, Row, WIDE};
+use crate::simd::{self, F32x16, LANES, Row};
 use crate::tree::BLOCK;
 use crate::tree::Corners;
 use crate::tree::filter_start::FilterStart;
@@ -319,7 +319,7 @@ where
     }
 
     #[inline(always)]
-    fn f32_rows(rays: &[Ray32; WIDE], rows: &mut [Row<f32>; 8]) {
+    fn f32_rows(rays: &[Ray32; LANES], rows: &mut [Row<f32>; 8]) {
         let (first, last) = rays.split_at(8);
         let (Ok(first), Ok(last)) = (first.try_into(), last.try_into()) else {
             unreachable!("sixteen are twice eight")
@@ -345,12 +345,12 @@ where
     }
 
     #[inline(always)]
-    fn columns(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
+    fn columns(rays: &[Ray; LANES], columns: &mut [Row<f64>; 8]) {
         if AVX512 {
             Self::columns_by_eight(rays, columns);
             return;
         }
-        for four in 0..WIDE / 4 {
+        for four in 0..LANES / 4 {
             for half in 0..2 {
                 let at = |i: usize| Self::numbers(&rays[4 * four + i]).wrapping_add(4 * half);
                 let (a, b, c, d) = (at(0), at(1), at(2), at(3));

@@ -10,7 +10,7 @@ use super::X86;
 use crate::intersect::axes::{Axes, Sides};
 use crate::intersect::box_ray::{END_FACTOR, LITTLE, START_FACTOR, Slabs};
 use crate::ray32::Ray32;
-use crate::simd::{Row, WIDE};
+use crate::simd::{LANES, Row};
 use crate::tree::filter_start::FilterStart;
 
 impl<const AVX512: bool> X86<AVX512> {
@@ -24,7 +24,7 @@ impl<const AVX512: bool> X86<AVX512> {
     /// Eight rays, transposed. The columns are written as wide as they are read: a load that spans two stores would
     /// stall.
     #[inline(always)]
-    pub(super) fn columns_by_eight(rays: &[Ray; WIDE], columns: &mut [Row<f64>; 8]) {
+    pub(super) fn columns_by_eight(rays: &[Ray; LANES], columns: &mut [Row<f64>; 8]) {
         const EVEN: i32 = 0b10_00_10_00;
         const ODD: i32 = 0b11_01_11_01;
         for half in 0..2 {

@@ -8,7 +8,7 @@ use bytemuck::Zeroable;
 
 use super::eight::{Eight256, max_of_eight};
 use crate::simd::opaque_number;
-use crate::simd::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
+use crate::simd::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x16, LANE_BITS, LANES, LastEight, Row, Vector};
 
 /// Only where `intersect::x86::X86<false>` is, alike.
 #[derive(Clone, Copy, Zeroable)]
@@ -139,11 +139,11 @@ macro_rules! by_halves {
 }
 
 impl Vector for Avx2 {
-    const COUNT: usize = WIDE;
-    type Array = [f32; WIDE];
+    const COUNT: usize = LANES;
+    type Array = [f32; LANES];
 
     #[inline(always)]
-    fn to_array(self) -> [f32; WIDE] {
+    fn to_array(self) -> [f32; LANES] {
         let mut row = Row::of(0.0);
         self.store(&mut row);
         row.0
@@ -198,7 +198,7 @@ impl F32x16 for Avx2 {
     }
 
     #[inline(always)]
-    fn load(row: &[f32; WIDE]) -> Self {
+    fn load(row: &[f32; LANES]) -> Self {
         // SAFETY: see the type. The loads are of eight f32 each, of sixteen.
         unsafe { Self([_mm256_loadu_ps(row.as_ptr()), _mm256_loadu_ps(row.as_ptr().add(8))]) }
     }
@@ -404,9 +404,9 @@ impl F32x16 for Avx2 {
     }
 
     #[inline(always)]
-    fn bits(self) -> [i32; WIDE] {
+    fn bits(self) -> [i32; LANES] {
         let [low, high] = self.integers();
-        let mut bits = [0; WIDE];
+        let mut bits = [0; LANES];
         // SAFETY: see the type. The stores are of eight i32 each, of sixteen.
         unsafe {
             _mm256_storeu_si256(bits.as_mut_ptr().cast(), low);
@@ -416,7 +416,7 @@ impl F32x16 for Avx2 {
     }
 
     #[inline(always)]
-    fn put_chosen(mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<u32>; WIDE]) {
+    fn put_chosen(mask: u32, words: &[u32; LANES], place: &mut [MaybeUninit<u32>; LANES]) {
         // SAFETY: see the type. The loads are of eight u32 each, of sixteen; so are the stores, the second no farther than eight on.
         unsafe {
             let (words, place) = (words.as_ptr(), place.as_mut_ptr());

@@ -7,7 +7,7 @@ use std::ops::{Add, Div, Mul, Sub};
 use bytemuck::Zeroable;
 
 use super::eight::{Eight256, SIGN, max_of_eight};
-use crate::simd::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x16, LANE_BITS, LastEight, Row, Vector, WIDE};
+use crate::simd::vector::{AFTER_MIDDLE, BEFORE_MIDDLE, F32x16, LANE_BITS, LANES, LastEight, Row, Vector};
 
 /// Only where `intersect::x86::X86<true>` is: the instructions are there.
 #[derive(Clone, Copy)]
@@ -22,11 +22,11 @@ operator!(Avx512; Mul mul _mm512_mul_ps);
 operator!(Avx512; Div div _mm512_div_ps);
 
 impl Vector for Avx512 {
-    const COUNT: usize = WIDE;
-    type Array = [f32; WIDE];
+    const COUNT: usize = LANES;
+    type Array = [f32; LANES];
 
     #[inline(always)]
-    fn to_array(self) -> [f32; WIDE] {
+    fn to_array(self) -> [f32; LANES] {
         let mut row = Row::of(0.0);
         self.store(&mut row);
         row.0
@@ -104,7 +104,7 @@ impl F32x16 for Avx512 {
     }
 
     #[inline(always)]
-    fn load(row: &[f32; WIDE]) -> Self {
+    fn load(row: &[f32; LANES]) -> Self {
         // SAFETY: see the type. The load is of sixteen f32.
         unsafe { Self(_mm512_loadu_ps(row.as_ptr())) }
     }
@@ -120,7 +120,7 @@ impl F32x16 for Avx512 {
         // SAFETY: see the type. The loads are of eight f64 each, of sixteen.
         unsafe {
             let low = _mm512_loadu_pd(row.0.as_ptr());
-            Self::of_halves(low, _mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)))
+            Self::of_halves(low, _mm512_loadu_pd(row.0.as_ptr().add(LANES / 2)))
         }
     }
 
@@ -130,7 +130,7 @@ impl F32x16 for Avx512 {
         unsafe {
             let first = _mm512_set1_pd(row.0[0]);
             let low = _mm512_loadu_pd(row.0.as_ptr());
-            let high = _mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2));
+            let high = _mm512_loadu_pd(row.0.as_ptr().add(LANES / 2));
             _mm512_cmp_pd_mask::<_CMP_NEQ_UQ>(low, first) | _mm512_cmp_pd_mask::<_CMP_NEQ_UQ>(high, first)
                 == 0
         }
@@ -142,7 +142,7 @@ impl F32x16 for Avx512 {
         unsafe {
             let (place, scale) = (_mm512_set1_pd(place), _mm512_set1_pd(scale));
             let low = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr()), place);
-            let high = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)), place);
+            let high = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr().add(LANES / 2)), place);
             Self::of_halves(_mm512_mul_pd(low, scale), _mm512_mul_pd(high, scale))
         }
     }
@@ -164,7 +164,7 @@ impl F32x16 for Avx512 {
         unsafe {
             let place = _mm512_set1_pd(place);
             let low = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr()), place);
-            let high = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr().add(WIDE / 2)), place);
+            let high = _mm512_sub_pd(_mm512_loadu_pd(row.0.as_ptr().add(LANES / 2)), place);
             let rounded = Self::of_halves(low, high);
             let low_rest = _mm512_sub_pd(low, _mm512_cvtps_pd(_mm512_castps512_ps256(rounded.0)));
             let high_rest = _mm512_sub_pd(high, _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(rounded.0)));
@@ -271,15 +271,15 @@ impl F32x16 for Avx512 {
     }
 
     #[inline(always)]
-    fn bits(self) -> [i32; WIDE] {
-        let mut bits = [0; WIDE];
+    fn bits(self) -> [i32; LANES] {
+        let mut bits = [0; LANES];
         // SAFETY: see the type. The store is of sixteen i32.
         unsafe { _mm512_storeu_si512(bits.as_mut_ptr().cast(), self.integers()) };
         bits
     }
 
     #[inline(always)]
-    fn first_four(self, mask: u32, words: &[u32; WIDE]) -> [i64; 4] {
+    fn first_four(self, mask: u32, words: &[u32; LANES]) -> [i64; 4] {
         // SAFETY: see the type. The load is of sixteen u32.
         unsafe {
             let words = _mm512_loadu_si512(words.as_ptr().cast());
@@ -292,7 +292,12 @@ impl F32x16 for Avx512 {
     }
 
     #[inline(always)]
-    fn put_falling(self, mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<i64>; 4]) -> bool {
+    fn store_four_descending(
+        self,
+        mask: u32,
+        words: &[u32; LANES],
+        place: &mut [MaybeUninit<i64>; 4],
+    ) -> bool {
         // SAFETY: see the type. The load is of sixteen u32, the store of four i64.
         unsafe {
             let words = _mm512_loadu_si512(words.as_ptr().cast());
@@ -312,7 +317,7 @@ impl F32x16 for Avx512 {
     }
 
     #[inline(always)]
-    fn put_chosen(mask: u32, words: &[u32; WIDE], place: &mut [MaybeUninit<u32>; WIDE]) {
+    fn put_chosen(mask: u32, words: &[u32; LANES], place: &mut [MaybeUninit<u32>; LANES]) {
         // SAFETY: see the type. The load and the store are of sixteen u32.
         unsafe {
             let words = _mm512_loadu_si512(words.as_ptr().cast());

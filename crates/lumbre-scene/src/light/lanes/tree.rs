@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn what_shines_on_a_place_is_never_left_out_and_densities_are_those_of_the_choice() {
+    fn every_light_can_be_chosen_and_densities_match() {
         let mut random = RandomStream::new(16);
         // Far from where numbers are fine, too.
         for (size, middle) in [(10.0, DVec3::ZERO), (10.0, DVec3::splat(3e4)), (2e5, DVec3::ONE)] {

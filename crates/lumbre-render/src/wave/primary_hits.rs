@@ -122,7 +122,7 @@ impl<'a, 's> PrimaryHits<'a, 's> {
     }
 
     /// The camera ray of a sample, and its first hit.
-    pub(crate) fn sight(&self, slot: usize) -> PrimaryHit<'s> {
+    pub(crate) fn primary_hit(&self, slot: usize) -> PrimaryHit<'s> {
         let ray = self.camera(slot);
         let met = self.wave.hits.interaction(self.scene, slot, &ray.ray, &ray.footprint);
         PrimaryHit { ray, met }
@@ -158,8 +158,8 @@ impl<'a, 's> PrimaryHits<'a, 's> {
     }
 
     /// The random numbers of a sample.
-    pub(crate) fn draw(&self, slot: usize) -> SampleNumbers {
-        self.wave.slots.draw(slot)
+    pub(crate) fn numbers(&self, slot: usize) -> SampleNumbers {
+        self.wave.slots.numbers(slot)
     }
 
     /// Removes samples from the integrator's list unless the predicate holds.
@@ -188,7 +188,7 @@ impl<'a, 's> PrimaryHits<'a, 's> {
     pub fn each(&mut self, mut radiance: impl FnMut(PrimaryHit<'s>, &SampleNumbers) -> Spectrum) {
         for at in 0..self.wanted.len() {
             let slot = self.wanted[at] as usize;
-            let found = radiance(self.sight(slot), &self.draw(slot));
+            let found = radiance(self.primary_hit(slot), &self.numbers(slot));
             self.wave.slots.radiance[slot] = found;
         }
     }
