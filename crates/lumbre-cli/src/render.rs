@@ -143,7 +143,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME", value_parser = one_of(&ToneMap::NAMES, ToneMap::from_name))]
     tonemap: Option<ToneMap>,
     /// AOVs as layers of an .exr, separated by commas.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&FEATURES, Feature::from_name))]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&Feature::NAMES, Feature::from_name))]
     aov: Vec<Feature>,
     /// What .exr and .png say of themselves: what their pixels depend on (version, a hash of the scene and the options, seed, samples,
     /// camera), the same for every run; or, in full, the command and its time as well.
@@ -215,9 +215,6 @@ const WRITTEN: [&str; 5] = ["png", "exr", "hdr", "pfm", "jpg"];
 fn written_format(name: &str) -> Option<ImageFormat> {
     ImageFormat::from_path(Path::new(&format!("picture.{name}")))
 }
-
-/// The names of AOVs.
-pub(crate) const FEATURES: [&str; 4] = ["albedo", "normal", "depth", "uv"];
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {

@@ -1,7 +1,7 @@
-//! POV-Ray's scenes beside the pictures that POV-Ray makes of them, where their folder is present.
+//! POV-Ray's scenes against the pictures that POV-Ray renders of them, where their folder is present.
 //!
-//! A pixel differs by its largest channel. At most a share of the pixels may differ by more than 0.004, and the others on average by next
-//! to nothing: `cases/pov/EXPECTED.md` says how much.
+//! A pixel differs by its largest channel. At most a share of the pixels may differ by more than 0.004, and the others
+//! on average by next to nothing: `cases/pov/EXPECTED.md` says how much.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -181,9 +181,9 @@ fn is_near(found: &str, expected: &str) -> bool {
         })
 }
 
-/// What became of the scenes of a folder: how many are read, how many without a warning, and how many have the picture that POV-Ray makes
-/// of them, where `povray` is on the path. `LUMBRE_POV_CORPUS=/usr/share/doc/povray/examples cargo test -p lumbre --test pov --
-/// --ignored --nocapture`; with `LUMBRE_POV_CASE=glass` those whose path has this in it.
+/// What became of the scenes of a folder: how many are read, how many without a warning, and how many have the picture
+/// that POV-Ray makes of them, where `povray` is on the path. `LUMBRE_POV_CORPUS=/usr/share/doc/povray/examples cargo
+/// test -p lumbre --test pov -- --ignored --nocapture`; with `LUMBRE_POV_CASE=glass` those whose path has this in it.
 #[test]
 #[ignore = "its scenes are where POV-Ray's examples are installed"]
 fn the_corpus_is_read() {

@@ -15,27 +15,27 @@ use crate::transport::{PrimaryHit, Record, SampleNumbers};
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///
 /// Whitted, "An Improved Illumination Model for Shaded Display", CACM 23(6), 1980. A mixture counts with all of its
-/// materials at once. Where a classic ray tracer gives up a branch that carries too little to be seen, it goes on here as
-/// often as it carries light, so that the picture is right in the mean. Direct light goes straight on through smooth panes
-/// without thickness; what is rough, or bends it, throws a shadow.
+/// materials at once. A branch that carries too little light to be visible ends by Russian roulette, so that the
+/// picture is unbiased. Direct light passes straight through smooth panes without thickness; rough or refracting
+/// surfaces cast a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Whitted {
-    /// Reflections and refractions one after the other at most, and the direct light of the last surface.
+    /// Maximum number of successive reflections and refractions.
     pub max_depth: u32,
-    /// Points on each light that has a surface, at least 1: those of all samples of a pixel are even together.
+    /// Points on each area light, at least 1; the points of all samples of a pixel are stratified together.
     pub light_samples: u32,
     /// Whether lights at infinity light surfaces. Without it they are background: mirrors and escaping rays show them.
     pub sky: bool,
-    /// What is made of shading normals that are not those of the surface.
+    /// The treatment of shading normals that differ from the geometric ones.
     pub shading_normals: ShadingNormals,
 }
 
-/// With more lights than these, one is chosen by its power.
+/// With more lights than this, one is chosen by power.
 const EVERY_LIGHT_UP_TO: usize = 64;
-/// A branch that carries less than this goes on as often as it carries this.
+/// A branch that carries less than this plays Russian roulette.
 const FAINT: f32 = 1.0 / 255.0;
 
-/// A ray that is still to be followed.
+/// A pending ray.
 struct Branch<'s> {
     ray: Ray,
     interiors: MediumStack<'s>,
@@ -44,7 +44,7 @@ struct Branch<'s> {
     depth: u32,
 }
 
-/// The materials at a place that scatter, with their shares.
+/// The scattering materials at a point, with their shares.
 type Scatterers<'a, 's> = SmallVec<[(f32, Vertex<'a, 's>); 2]>;
 
 impl Whitted {
@@ -53,7 +53,7 @@ impl Whitted {
         Self { max_depth, light_samples: 1, sky: false, shading_normals: ShadingNormals::default() }
     }
 
-    /// What scatters at a vertex of the tree of rays; its mirrors and its glass go to `pending`.
+    /// The scattering materials at a vertex of the tree of rays; mirrors and glass go to `pending`.
     fn split<'a, 's>(
         &self,
         scene: &'s Scene,
@@ -100,7 +100,7 @@ impl Whitted {
         scatterers
     }
 
-    /// Direct light on all that scatters at a place.
+    /// Direct light on all scattering materials at a point.
     fn direct<'s>(
         &self,
         scene: &Scene,
@@ -140,7 +140,7 @@ impl Whitted {
     }
 }
 
-/// How a ray came to a vertex: what it carries, and which one in the tree of rays this is.
+/// The arrival at a vertex: the throughput, and the index of the vertex in the tree of rays.
 struct Arrival<'s> {
     interiors: MediumStack<'s>,
     throughput: Spectrum,
@@ -164,7 +164,7 @@ impl RayIntegrator for Whitted {
             Arrival { interiors: MediumStack::default(), throughput: Spectrum::WHITE, depth: 0, vertex: 0 };
         loop {
             if let Some(here) = &met {
-                // Of a mixture the one material that stands for it says what the way was inside of.
+                // For a mixture, the chosen material says which medium the segment was in.
                 came.interiors.arrive(here, here.resolved());
                 came.throughput *= came.interiors.transmittance(ray_length(&ray, here));
                 record.note(|| Event::Met(Met::of(&ray, here, came.depth, came.throughput)));
@@ -195,7 +195,7 @@ impl RayIntegrator for Whitted {
     }
 }
 
-/// What all materials of a place scatter of a light's sample.
+/// The light of a sample that all materials of a point scatter.
 fn scattered<'s>(
     scene: &Scene,
     scatterers: &Scatterers<'_, 's>,
@@ -205,7 +205,7 @@ fn scattered<'s>(
 ) -> Spectrum {
     let mut sum = Spectrum::BLACK;
     let mut shadow_ray = None;
-    // Light of any kind, for nothing else brings it from behind a pane to what scatters.
+    // Lights of any kind, since nothing else finds light behind a pane.
     let goes_straight_on = scene.has_delta_transmission();
     for (share, vertex) in scatterers {
         let scattered = vertex.eval(sample.towards) * *share;
