@@ -16,18 +16,19 @@ use crate::{PassedOn, field};
 /// What can be measured.
 #[derive(Subcommand)]
 pub(crate) enum Bench {
-    /// Rays a second, build speed and memory of the kernel, beside Embree 4 where EMBREE_LIB names its shared library, and
-    /// beside the crates obvhs and bvh. All options are passed through: `kernel --help`.
+    /// Rays a second, build speed and memory of the kernel, against Embree 4 if EMBREE_LIB names its shared library,
+    /// and against the crates obvhs and bvh. All options are passed through: `kernel --help`.
     #[command(disable_help_flag = true)]
     Kernel(PassedOn),
     /// Time and peak memory of reading n, 2n and 4n of everything that a file can list: `growth --help`.
     #[command(disable_help_flag = true)]
     Growth(PassedOn),
-    /// Error against time on scenes of all kinds, beside Mitsuba 3, Cycles, LuxCore and pbrt-v4 where they are found: in Python
-    /// environments that MITSUBA_PYTHON, BPY_PYTHON and LUXCORE_PYTHON name or that --install made, and on the PATH.
+    /// Error against time on scenes of all kinds, compared with Mitsuba 3, Cycles, LuxCore and pbrt-v4 where they are
+    /// found: in Python environments that MITSUBA_PYTHON, BPY_PYTHON and LUXCORE_PYTHON name or that --install made,
+    /// and on the PATH.
     Render(Race),
-    /// The time of a path against the number of lights (to a million), of triangles (to ten million) and of instances (to a
-    /// million), each in a scene of its own.
+    /// The time of a path against the number of lights (to a million), of triangles (to ten million) and of instances
+    /// (to a million), each in a scene of its own.
     Scaling(Scaling),
     /// The field of exact shapes, against POV-Ray where it is on the PATH.
     Field {

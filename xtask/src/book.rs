@@ -1,5 +1,6 @@
-//! The book: the pages of `docs/` with their pictures rendered, their examples run and their links tried, as static pages. The pages of the
-//! repository have small pictures, what examples print, and the files that they show, too: `cargo xtask book --update` writes them.
+//! The book: the pages of `docs/` with their pictures rendered, their examples run and their links tried, as static
+//! pages. The pages of the repository have small pictures, what examples print, and the files that they show, too:
+//! `cargo xtask book --update` writes them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,11 +35,12 @@ const COVERAGE: &str = "docs/coverage.md";
 /// How the book is built.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct Book {
-    /// Pictures of one sample a pixel and a quarter of the width and height, by the program as the tests build it: for the checks alone.
+    /// Pictures of one sample a pixel and a quarter of the width and height, by the program as the tests build it: for
+    /// the checks alone.
     #[arg(long)]
     quick: bool,
-    /// Brings the pages of the repository up to date, and builds no book: files that they show, what their examples print, and small pictures of
-    /// scenes that are new or have changed.
+    /// Brings the pages of the repository up to date, and builds no book: files that they show, what their examples
+    /// print, and small pictures of scenes that are new or have changed.
     #[arg(long, conflicts_with_all = ["quick", "install_only"])]
     update: bool,
     /// With --update, only pages whose path contains one of these, such as light/ or quadric.md.
@@ -82,7 +84,7 @@ impl Book {
     }
 }
 
-/// The checks of the book; where mdbook is not found, those that need none, which is said.
+/// The checks of the book; without mdbook, the checks that do not need it, with a message.
 pub(crate) fn test() -> Result<()> {
     match find_mdbook() {
         Some(mdbook) => build(&mdbook, true),
@@ -136,8 +138,8 @@ fn build(mdbook: &Path, quick: bool) -> Result<()> {
     Ok(())
 }
 
-/// Prepares a copy of the pages for mdbook, or brings those of the repository up to date, of which only those that contain one of `only`, if any.
-/// The folder of the copy.
+/// Prepares a copy of the pages for mdbook, or updates the pages of the repository (only paths that contain one of
+/// `only`, if any). The folder of the copy.
 fn prepare(quick: bool, update: bool, only: &[String]) -> Result<PathBuf> {
     let program = program(quick)?;
     let book = target().join("book");
@@ -174,7 +176,8 @@ pub(crate) fn program(quick: bool) -> Result<PathBuf> {
     release_program()
 }
 
-/// Runs mdbook over the prepared pages. What it warns of, such as a file that is to be included and is not there, is an error here.
+/// Runs mdbook over the prepared pages. What it warns of, such as a file that is to be included and is not there, is an
+/// error here.
 fn run_mdbook(mdbook: &Path, pages: &Path, html: &Path) -> Result<()> {
     let output = Command::new(mdbook)
         .arg("build")
@@ -250,7 +253,8 @@ mod tests {
         assert!(faults.is_empty(), "cargo xtask book --update mends these:\n{}", faults.join("\n"));
     }
 
-    /// The exercises of a page whose answer neither has a command that computes it, nor is marked as one of reasoning alone.
+    /// The exercises of a page whose answer neither has a command that computes it, nor is marked as one of reasoning
+    /// alone.
     fn uncomputed(text: &str) -> Vec<String> {
         let answers = text.split("<details>").skip(1).filter_map(|rest| rest.split("</details>").next());
         let is_computed = |answer: &&str| !answer.contains("```console") && !answer.contains(REASONED);

@@ -19,11 +19,12 @@ use crate::book;
 /// The page that has the table.
 const PAGE: &str = "docs/promises.md";
 
-/// Pictures of all scenes, answers to rays, results and explanations, as hashes: by this machine's instruction sets, and by other programs.
+/// Pictures of all scenes, answers to rays, results and explanations, as hashes: by this machine's instruction sets,
+/// and by other programs.
 #[derive(Args)]
 pub(crate) struct Bytes {
-    /// Another program, and what runs it: "aarch64=qemu-aarch64 -L /usr/aarch64-linux-gnu lumbre". It is run at the root of the workspace,
-    /// with relative names. Words are parted by blanks.
+    /// Another program, and what runs it: "aarch64=qemu-aarch64 -L /usr/aarch64-linux-gnu lumbre". It is run at the
+    /// root of the workspace, with relative names. Words are parted by blanks.
     #[arg(long, value_name = "NAME=COMMAND")]
     with: Vec<String>,
     /// Keep the table in docs/promises.md. Else what comes out is compared with the one that is there.
@@ -57,7 +58,8 @@ pub(crate) fn test(others: &[String]) -> Result<()> {
     Bytes { with: others.to_vec(), update: false }.run()
 }
 
-/// The tested program (or that which `LUMBRE_PROGRAM` names) with every instruction set that this machine has, the best first.
+/// The tested program (or that which `LUMBRE_PROGRAM` names) with every instruction set that this machine has, the best
+/// first.
 fn native() -> Result<Vec<Program>> {
     let program = book::program(true)?.to_string_lossy().into_owned();
     let sets = InstructionSet::available().into_iter().rev().map(InstructionSet::name);

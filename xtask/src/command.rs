@@ -68,8 +68,8 @@ pub enum Profile {
     Release,
 }
 
-/// Builds a program of the package `lumbre-dev` and runs it in the user's folder, so that relative paths mean what they say. Where it
-/// fails it has said why, and this program ends as it did.
+/// Builds a program of the package `lumbre-dev` and runs it in the user's folder, so that relative paths mean what they
+/// say. Where it fails it has said why, and this program ends as it did.
 pub fn run_ours(name: &str, profile: Profile, arguments: &[String]) -> Result<()> {
     let program = program("lumbre-dev", name, profile)?;
     let status = Command::new(&program)
@@ -89,7 +89,8 @@ pub fn target() -> PathBuf {
     root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
 }
 
-/// Builds all that the tests build, by the same features, so that nothing is compiled a second time, and says where it lies.
+/// Builds all that the tests build, by the same features, so that nothing is compiled a second time, and says where it
+/// lies.
 pub fn built_as_for_tests() -> Result<PathBuf> {
     run("cargo", &["build", "--workspace"])?;
     Ok(target().join("debug"))

@@ -37,12 +37,14 @@ enum Task {
     /// Everything that must hold before a change lands: format, lint, unit, contract and doc tests, docs, licences.
     /// Installs what it needs.
     Test {
-        /// Also what takes hours, and is due before a release: the longest tests, the proofs, Miri, the address sanitizer, and every
-        /// package compiled by itself, and the program's as on Windows, under Wine. What some need is named where it is missing.
+        /// Also what takes hours, and is due before a release: the longest tests, the proofs, Miri, the address
+        /// sanitizer, and every package compiled alone, and the program's as on Windows, under Wine. Missing tools are
+        /// named.
         #[arg(long)]
         all: bool,
     },
-    /// What is worth knowing between two edits: format, lints, and the tests of the packages with changes that are not committed.
+    /// What is worth knowing between two edits: format, lints, and the tests of the packages with changes that are not
+    /// committed.
     Check {
         /// Also the packages that changed since this revision.
         #[arg(long, value_name = "REVISION")]
@@ -52,15 +54,16 @@ enum Task {
     Python,
     /// Builds the book of docs/ into target/book/html: renders its pictures, runs its examples, and tries its links.
     Book(book::Book),
-    /// The same bytes anywhere: hashes of pictures, answers, results and explanations, by instruction sets and programs.
+    /// The same bytes anywhere: hashes of pictures, answers, results and explanations, by instruction sets and
+    /// programs.
     Bytes(bytes::Bytes),
-    /// Makes what is handed out into target/dist: the program for each platform, wheels, a Debian package, the book, a list of what they are
-    /// made of, and sums. What cannot be made on this machine is named, with what it lacks.
+    /// Makes what is handed out into target/dist: the program for each platform, wheels, a Debian package, the book, a
+    /// list of what they are made of, and sums. What cannot be made on this machine is named, with what it lacks.
     Dist(dist::Dist),
-    /// Lumbre for the browser: makes the npm package and the playground in target/web, and tries both. Says what it needs where that is
-    /// missing.
+    /// Lumbre for the browser: makes the npm package and the playground in target/web, and tries both. Says what it
+    /// needs where that is missing.
     Web(web::Web),
-    /// Renders every scene under scenes/ to the picture beside it.
+    /// Renders every scene under scenes/ to the picture next to it.
     Scenes {
         /// Only scenes whose path contains this.
         filter: Option<String>,
@@ -76,11 +79,11 @@ enum Task {
     /// Compares a picture with a reference of the same scene, means, and each pixel by its noise: `agree --help`.
     #[command(disable_help_flag = true)]
     Agree(PassedOn),
-    /// Walks the example scenes of POV-Ray, where they and povray are installed: which are read, without a warning, and which agree with
-    /// POV-Ray's picture. The program is the one that `LUMBRE_PROGRAM` names, if any.
+    /// Walks the example scenes of POV-Ray, where they and povray are installed: which are read, without a warning, and
+    /// which agree with POV-Ray's picture. The program is the one that `LUMBRE_PROGRAM` names, if any.
     Povray(povray::Corpus),
-    /// Proves the kernel by numbers, more of them than the tests have: `leaks` sends rays at edges and vertices of closed
-    /// meshes, `loop` compares trees with a loop over everything.
+    /// Proves the kernel by numbers, more of them than the tests have: `leaks` sends rays at edges and vertices of
+    /// closed meshes, `loop` compares trees with a loop over everything.
     Proof {
         /// What is to be shown.
         what: proof::Claim,
@@ -91,20 +94,22 @@ enum Task {
         #[arg(long, default_value_t = 1)]
         seed: u64,
     },
-    /// Runs a small set of the kernel's tests, on its portable path, in the interpreter Miri. Needs a nightly toolchain with
-    /// the components miri and rust-src.
+    /// Runs a small set of the kernel's tests, on its portable path, in the interpreter Miri. Needs a nightly toolchain
+    /// with the components miri and rust-src.
     Miri,
-    /// Runs the kernel's tests, with every instruction set that the machine has, under the address sanitizer. Needs a nightly
-    /// toolchain.
+    /// Runs the kernel's tests, with every instruction set that the machine has, under the address sanitizer. Needs a
+    /// nightly toolchain.
     Asan,
-    /// Damages files of every kind at random, target by target, and keeps what breaks a reader. Needs a nightly toolchain.
+    /// Damages files of every kind at random, target by target, and keeps what breaks a reader. Needs a nightly
+    /// toolchain.
     Fuzz(fuzz::Fuzz),
     /// Measures Lumbre, against peers where they are found.
     #[command(subcommand)]
     Bench(bench::Bench),
 }
 
-/// What is told to a program of the workspace that needs Lumbre itself: so that this one, which the first check waits for, need not.
+/// Arguments for a program of the workspace that links Lumbre, so that this one, which the first check waits for, need
+/// not.
 #[derive(Args)]
 struct PassedOn {
     /// Its arguments.

@@ -1,4 +1,4 @@
-//! The pictures that stand beside the scenes.
+//! The pictures next to the scenes.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use xtask::command::{release_program, root, run};
 
 use crate::files;
 
-/// Renders every scene under `scenes/` whose path contains `filter` to a PNG beside it, without noise.
+/// Renders every scene under `scenes/` whose path contains `filter` to a PNG next to it, denoised.
 pub(crate) fn render_all(filter: Option<&str>) -> Result<()> {
     let program = release_program()?;
     let program = program.to_string_lossy();

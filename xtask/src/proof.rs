@@ -29,7 +29,8 @@ pub(crate) fn run_proof(claim: Claim, rays: Option<u64>, seed: u64) -> Result<()
 pub(crate) fn miri() -> Result<()> {
     let arguments =
         ["+nightly", "miri", "test", "--package", "lumbre-kernel", "--lib", "--", "tests::small", "stack::"];
-    // The queues below rayon turn integers into pointers, and keep the rules of tree borrows but not those of stacked ones.
+    // The queues below rayon turn integers into pointers, and keep the rules of tree borrows but not those of stacked
+    // ones.
     let flags =
         "-Zmiri-tree-borrows -Zmiri-permissive-provenance -Zmiri-ignore-leaks -Zmiri-disable-isolation";
     run_with("cargo", &arguments, &[("MIRIFLAGS", flags), ("RAYON_NUM_THREADS", "1")])

@@ -13,8 +13,8 @@ const HAS_ALL: &str = "import distributed, manifold3d, mypy, numpy, pytest, rtre
 /// Whether an interpreter is of a version that the package is for, and makes environments.
 const IS_FIT: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 10))";
 
-/// Builds the native module with the profile of the tests, and runs pytest and the checks of types. Where Python or what the tests need
-/// is not there and cannot be installed, they are left out, and that is said.
+/// Builds the native module with the profile of the tests, and runs pytest and the checks of types. Where Python or
+/// what the tests need is not there and cannot be installed, they are left out, and that is said.
 pub(crate) fn test() -> Result<()> {
     let Some(python) = environment() else { return Ok(()) };
     let package = root().join("crates/lumbre-python");
@@ -60,7 +60,8 @@ fn environment() -> Option<String> {
     }
 }
 
-/// The folder of trimesh's own tests, which are in its source package alone; `None`, which is said, where that is not to be had.
+/// The folder of trimesh's own tests, which are in its source package alone; `None`, which is said, where that is not
+/// to be had.
 fn trimesh_tests(python: &str) -> Option<String> {
     let requirements = fs::read_to_string(root().join(REQUIREMENTS)).ok()?;
     let wanted = requirements.lines().find(|line| line.starts_with("trimesh=="))?;
@@ -80,7 +81,7 @@ fn trimesh_tests(python: &str) -> Option<String> {
     fetched.ok().map(|()| text(&tests))
 }
 
-/// Builds the native module and puts it beside the sources, where Python finds it.
+/// Builds the native module and puts it next to the sources, where Python finds it.
 fn build_module(package: &Path) -> Result<()> {
     let built = built_as_for_tests()?;
     let name = format!("{}_lumbre{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX);

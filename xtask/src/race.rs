@@ -1,4 +1,5 @@
-//! The race: Lumbre and its peers render the same scenes in turn, and the error of their pictures is set against the time.
+//! The race: Lumbre and its peers render the same scenes in turn, and the error of their pictures is set against the
+//! time.
 
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -25,13 +26,14 @@ mod scene;
 mod scenes;
 mod write;
 
-/// What the race is told.
+/// The arguments of the race.
 #[derive(Args)]
 pub(crate) struct Race {
     /// Small pictures and few samples: two to three minutes.
     #[arg(long)]
     quick: bool,
-    /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats, models, tumbler, pool, cloud, smoke.
+    /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats, models, tumbler, pool,
+    /// cloud, smoke.
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
     /// Only these programs; by default all that are found. Lumbre always takes part.
@@ -43,8 +45,8 @@ pub(crate) struct Race {
     /// How often each picture is rendered: the least time and the mean error count.
     #[arg(long, default_value_t = 1)]
     runs: u32,
-    /// The folder for race.md, between its markers where it exists, and for the plots, such as docs/measurements; by default
-    /// target/bench/race.
+    /// The folder for race.md, between its markers where it exists, and for the plots, such as docs/measurements; by
+    /// default target/bench/race.
     #[arg(long)]
     out: Option<PathBuf>,
     /// The figures as JSON, too.
@@ -131,7 +133,7 @@ fn scene_folder(scene: &Scene, size: u32, work: &Path) -> PathBuf {
     work.join("scenes").join(format!("{}-{size}", scene.name))
 }
 
-/// Small pictures of the scenes beside the tables.
+/// Small pictures of the scenes next to the tables.
 fn draw(scenes: &[Scene], lumbre: &Path, size: u32, work: &Path, out: &Path) -> Result<()> {
     for scene in scenes {
         let picture = out.join("race").join(format!("{}.png", scene.name));
@@ -323,7 +325,8 @@ struct Reference {
     noise: f64,
 }
 
-/// A reference by one program, in two halves that tell its noise. They are kept in files that are named after all that they depend on.
+/// A reference by one program, in two halves that measure its noise. They are kept in files that are named after all
+/// that they depend on.
 fn reference(program: &mut Program, scene: &Scene, spp: u32, folder: &Path) -> Result<Reference> {
     let mut hasher = DefaultHasher::new();
     write::pbrt(scene, 0).hash(&mut hasher);

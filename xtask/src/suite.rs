@@ -56,8 +56,8 @@ pub(crate) fn run_all() -> Result<()> {
     }
 }
 
-/// The declared minimum Rust version compiles everything, where that toolchain is installed. Clippy's `incompatible_msrv` finds what
-/// is newer in the standard library without it.
+/// The declared minimum Rust version compiles everything, where that toolchain is installed. Clippy's
+/// `incompatible_msrv` finds what is newer in the standard library without it.
 fn oldest_compiler() -> Result<()> {
     let version = env!("CARGO_PKG_RUST_VERSION");
     if succeeds("rustup", &["run", version, "cargo", "--version"]) {
@@ -67,7 +67,8 @@ fn oldest_compiler() -> Result<()> {
     Ok(())
 }
 
-/// Every crate that is published makes a package. The packages are not compiled, which would take as long as all the tests.
+/// Every crate that is published makes a package. The packages are not compiled, which would take as long as all the
+/// tests.
 fn package() -> Result<()> {
     let arguments = [
         "package",

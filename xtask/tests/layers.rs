@@ -1,4 +1,5 @@
-//! The architecture holds: dependencies between our crates, between folders and between files within them, point down only.
+//! The architecture holds: dependencies between our crates, between folders and between files within them, point down
+//! only.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -152,7 +153,8 @@ fn folders_use_lower_folders_only() {
     }
 }
 
-/// Circles of files that import one another, crate by crate: the sizes that there are, the largest first. They may only shrink.
+/// Circles of files that import one another, crate by crate: the sizes that there are, the largest first. They may only
+/// shrink.
 const CIRCLES: &[(&str, &[usize])] = &[
     ("lumbre-cli", &[8, 4]),
     ("lumbre-formats", &[12, 7, 6, 3, 2]),

@@ -5,7 +5,7 @@ use lumbre::image::ToneMap;
 use lumbre::math::Elementary;
 use lumbre::{Background, Error, Ground, RenderOptions, Scene, SceneDesc, Stage, StageLight, Staged};
 
-/// Samples per pixel of a model without camera and light, of which the noise is taken out.
+/// Samples per pixel of a bare model, which is denoised.
 const MODEL_SPP: u32 = 16;
 
 /// What is to be known of a scene on its stage.

@@ -104,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let variants = info.listing.variants.iter().map(|name| escaped_line(name).into_owned());
     let textures = info.listing.textures.iter();
     let textures = textures.map(|t| format!("{} {}x{}", escaped_line(&t.name), t.width, t.height));
-    // What most files lack is told only where it is.
+    // Most files lack these: printed only if present.
     let listed = |title: &str, names: Vec<String>| match names.len() {
         0 => String::new(),
         count => line(title, format!("{count}: {}", shortened(names.into_iter()))),

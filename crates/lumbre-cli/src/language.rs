@@ -1,4 +1,4 @@
-//! The languages in which numbers and their steps are told.
+//! The languages of explanations.
 
 use clap::ValueEnum;
 

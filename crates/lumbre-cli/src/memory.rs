@@ -1,4 +1,4 @@
-//! What fits into memory, as far as it can be told before work begins.
+//! Estimates of memory, before work begins.
 
 use std::fs;
 use std::path::Path;
@@ -101,7 +101,7 @@ impl Memory {
         }
     }
 
-    /// Refuses what needs more than is left beside `held` bytes.
+    /// Refuses more memory than is left next to `held` bytes.
     ///
     /// # Errors
     /// [`Failure::Limit`] with the prediction.
@@ -118,7 +118,7 @@ impl Memory {
         Err(Failure::Limit(format!("{what}: needs {needed} bytes of memory, {left} are left; {raise}")))
     }
 
-    /// Refuses a picture that would not fit beside `held` bytes, while it is rendered, saved or shown.
+    /// Refuses a picture that would not fit next to `held` bytes, while it is rendered, saved or shown.
     ///
     /// # Errors
     /// [`Failure::Limit`] with the prediction, and [`Failure::Usage`] for options that make no picture.
@@ -159,7 +159,7 @@ pub fn check_picture(options: &RenderOptions, held: u64) -> Result<(), Failure> 
     Memory::new(None).check_picture(options, held)
 }
 
-/// Bytes of memory that are free, or can be made so; `None` if the system does not tell.
+/// Bytes of memory that are free, or can be made so; `None` if the system does not report it.
 fn available_memory() -> Option<u64> {
     let memory = fs::read_to_string("/proc/meminfo").ok()?;
     let kibibytes = |name: &str| {
@@ -178,7 +178,7 @@ fn group_memory_left(root: &Path) -> Option<u64> {
         let mut parts = line.splitn(3, ':').skip(1);
         let (controllers, path) = (parts.next().unwrap_or(""), parts.next().unwrap_or(""));
         let mounts: &[&str] = match controllers {
-            // Version 2, also where version 1 stands beside it.
+            // Version 2, also if version 1 is mounted too.
             "" => &["sys/fs/cgroup", "sys/fs/cgroup/unified"],
             _ if controllers.split(',').any(|name| name == "memory") => &["sys/fs/cgroup/memory"],
             _ => &[],
@@ -207,7 +207,7 @@ fn left_in(folder: &Path) -> Option<u64> {
     Some(limit.saturating_sub(used.saturating_sub(cached.unwrap_or(0))))
 }
 
-/// Bytes of address space that the system still grants the process; `None` if it sets no limit, or does not tell.
+/// Bytes of address space that the system still grants the process; `None` if it sets no limit or does not report it.
 pub(crate) fn address_space_left() -> Option<u64> {
     let limits = fs::read_to_string("/proc/self/limits").ok()?;
     let soft = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
@@ -275,7 +275,7 @@ mod tests {
         assert_eq!(left(), None);
         write("proc/self/cgroup", "0::/outer/inner\n");
         assert_eq!(left(), None);
-        // Version 2: the limit of the one around it, of which files in the cache are free.
+        // Version 2: the limit of the parent group, where cached files count as free.
         write("sys/fs/cgroup/outer/inner/memory.max", "max\n");
         write("sys/fs/cgroup/outer/memory.max", "5000\n");
         write("sys/fs/cgroup/outer/memory.current", "3000\n");

@@ -27,7 +27,7 @@ mod tests {
         assert!(IntegratorKind::NAMES.iter().all(|name| IntegratorKind::from_name(name).is_some()));
         assert!(render::SHADING_NORMALS.iter().all(|name| ShadingNormals::from_name(name).is_some()));
         assert!(ToneMap::NAMES.iter().all(|name| ToneMap::from_name(name).is_some()));
-        assert!(render::FEATURES.iter().all(|name| Feature::from_name(name).is_some()));
+        assert!(Feature::NAMES.iter().all(|name| Feature::from_name(name).is_some()));
         assert!(diff::METRICS.iter().all(|name| Metric::from_name(name).is_some()));
         assert!(Choice::NAMES.iter().all(|name| Choice::from_name(name).is_some()));
         assert!(Ground::NAMES.iter().all(|name| Ground::from_name(name).is_some()));

@@ -101,7 +101,7 @@ pub(crate) enum Pictures {
     One,
     /// Frames of an animation, by number.
     Frames(RangeInclusive<u32>),
-    /// As many from all around.
+    /// The same number from every side.
     Turntable(u32),
 }
 
@@ -152,7 +152,7 @@ pub(crate) fn refuse_inputs(
 }
 
 /// The name of pictures for which none is given, or with `#` for their number the pattern of their names: that of the scene's
-/// film, or else of the scene's file, with the ending beside it. Where that is the name of a file that was read, or of one that Lumbre did not write, it is
+/// film, or else of the scene's file, with the ending next to it. Where that is the name of a file that was read, or of one that Lumbre did not write, it is
 /// `STEM.render.png`; the format is the same, but for PFM, which cannot say who wrote it: EXR holds the same numbers.
 ///
 /// # Errors

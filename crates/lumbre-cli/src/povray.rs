@@ -82,7 +82,7 @@ fn file_of_settings(word: &OsString) -> Option<(PathBuf, Option<String>)> {
     is_settings(Path::new(path)).then(|| (PathBuf::from(path), Some(section.to_owned())))
 }
 
-/// Whether a word is a switch of POV-Ray and no option of ours: with -, those that are usual.
+/// Whether a word is a switch of POV-Ray and no option of ours: with -, the usual ones.
 fn is_switch(text: &str, next_is_ours: bool) -> bool {
     match text.as_bytes() {
         [b'+', ..] => true,
@@ -100,7 +100,7 @@ fn read_settings(job: &mut PovJob, path: &Path, section: Option<&str>) -> Result
     job.read_ini(&text, section).map_err(|wrong| Failure::input(format!("{}: {wrong}", path.display())))
 }
 
-/// A scene by its name in a file of settings: where the command runs, or beside that file.
+/// A scene by its name in a file of settings: in the current folder, or next to that file.
 fn scene_beside(folder: &Path, name: &str) -> PathBuf {
     let name = PathBuf::from(name);
     let with_ending = |path: PathBuf| match path.extension() {

@@ -96,7 +96,7 @@ impl PictureViewer for Preview {
     }
 }
 
-/// What a terminal is told to show a picture; `again` over the one before.
+/// The escape sequence that shows a picture; `again` over the previous one.
 fn drawn(image: &Image, protocol: Protocol, tone_map: ToneMap, exposure: f32, again: bool) -> String {
     let (across, down) = match protocol {
         Protocol::Blocks => (CELLS.0, 2 * CELLS.1),

@@ -28,13 +28,13 @@ pub(crate) enum Style {
     None,
 }
 
-/// Who is shown the picture while it is rendered.
+/// Receives the picture during the render.
 pub(crate) trait PictureViewer: Sync {
     /// Shows the picture, unless one was shown a moment ago; the last one always. It is put together when asked for.
     fn show(&self, picture: &dyn Fn() -> Image, is_last: bool);
 }
 
-/// Progress on standard error, and to those who watch for signals.
+/// Reports progress to standard error and to the signal handler.
 pub(crate) struct ProgressReporter<'a> {
     /// What is shown.
     pub display: Display,
@@ -42,7 +42,7 @@ pub(crate) struct ProgressReporter<'a> {
     pub signals: &'a Signals,
     /// Who else wants to see the picture.
     pub viewers: Vec<Box<dyn PictureViewer>>,
-    /// Which of several pictures it is.
+    /// The position in a series of pictures.
     pub series: Option<Series>,
     /// The last whole pass over the picture.
     pub pass: Mutex<Pass>,
@@ -82,7 +82,7 @@ impl Series {
         (f64::from(self.done) + of_picture) / f64::from(self.count)
     }
 
-    /// The time until all are done, if they take as long in the mean, when this is done of the picture.
+    /// The time until all are done, if they take as long on average, when this is done of the picture.
     fn left(&self, of_picture: f64) -> Option<Duration> {
         let (share, elapsed) = (self.share(of_picture), self.start.elapsed().as_secs_f64());
         let is_known = self.done > 0 || of_picture >= MIN_SHARE;

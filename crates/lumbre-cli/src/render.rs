@@ -147,7 +147,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME", value_parser = one_of(&ToneMap::NAMES, ToneMap::from_name))]
     tonemap: Option<ToneMap>,
     /// AOVs as layers of an .exr, separated by commas.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&FEATURES, Feature::from_name))]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&Feature::NAMES, Feature::from_name))]
     aov: Vec<Feature>,
     /// Which metadata .exr and .png contain. Plain: what the pixels depend on (version, a hash of the scene and the options, seed, samples,
     /// camera), the same for every run. Full: also the command and its time.
@@ -219,9 +219,6 @@ const WRITTEN: [&str; 7] = ["png", "exr", "hdr", "pfm", "jpg", "webp", "qoi"];
 fn written_format(name: &str) -> Option<ImageFormat> {
     ImageFormat::from_path(Path::new(&format!("picture.{name}")))
 }
-
-/// The names of AOVs.
-pub(crate) const FEATURES: [&str; 4] = ["albedo", "normal", "depth", "uv"];
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {

@@ -89,7 +89,7 @@ pub(crate) fn shorten(program: Command, more: &str) -> Command {
     })
 }
 
-/// An argument of whose help `-h` tells the first sentence.
+/// An argument of which `-h` prints the first sentence of the help.
 fn with_sentence(arg: Arg) -> Arg {
     let Some(help) = arg.get_help().map(ToString::to_string) else { return arg };
     let long = arg.get_long_help().map_or_else(|| help.clone(), ToString::to_string);

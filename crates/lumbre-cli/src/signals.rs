@@ -18,7 +18,7 @@ use crate::failure::Failure;
 pub(crate) enum Phase {
     /// What leaves nothing to save, by what it is: it ends at once.
     Preparing(&'static str),
-    /// Rendering: it has [`GRACE`] to stop by itself, with what there is.
+    /// Rendering: it has [`GRACE`] to stop on its own, with the result so far.
     Rendering,
     /// Opening a pipe since this time, where no one may be to read: [`GRACE`].
     Opening(Instant),
@@ -32,7 +32,7 @@ pub(crate) enum Phase {
 const PREPARING_GRACE: Duration = Duration::from_secs(10);
 /// How long a render may take to stop.
 const GRACE: Duration = Duration::from_millis(1500);
-/// How much later than its end a render may stop by itself: its first, coarse picture is taken whatever the time.
+/// How much later than its deadline a render may stop: its first, coarse picture is taken whatever the time.
 const COARSE_GRACE: Duration = Duration::from_secs(10);
 /// How long a picture that took its time to render may take to be saved. Who cannot wait sends another signal.
 const SAVING_GRACE: Duration = Duration::from_secs(20);
@@ -54,7 +54,7 @@ const SIGNALS: [(i32, u8, bool); 6] = [
     (SIGXCPU, 152, false),
 ];
 
-/// The signals of [`SIGNALS`] that are listened for: all but those that its parent process had it ignore, as nohup does with
+/// The signals of [`SIGNALS`] that are handled: all but those that the parent process ignores, as nohup does with
 /// SIGHUP. SIGINT and SIGTERM are always, as they were ever: shells ignore SIGINT for what runs in the background.
 #[cfg(unix)]
 fn wanted() -> impl Iterator<Item = (i32, u8, bool)> {

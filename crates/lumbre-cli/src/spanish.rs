@@ -239,7 +239,7 @@ fn translated_argument(argument: Arg) -> Arg {
         None => "Opciones",
     };
     let argument = argument.help_heading(heading);
-    // What clap adds by itself would be English; the texts have it.
+    // clap's own additions would be English; the texts include them.
     let argument = match argument.get_action().takes_values() {
         true => argument.hide_possible_values(true).hide_default_value(true),
         false => argument,

@@ -22,7 +22,7 @@ const EVERY: Duration = Duration::from_millis(250);
 /// How long it may take to reach it, and to hand it a packet.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// A tev, and what it is told.
+/// A connection to tev, and its messages.
 pub(crate) struct Tev {
     name: String,
     state: Mutex<State>,

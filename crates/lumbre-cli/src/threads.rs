@@ -7,9 +7,9 @@ use crate::memory::address_space_left;
 /// Address space that a thread takes: its stack, and what the allocator sets apart for it.
 const ADDRESS_SPACE: u64 = 72 << 20;
 
-/// Starts as many as there are cores, or as the system grants: at the limit of a user's processes (`ulimit -u`) it refuses
+/// Starts one per core, or as many as the system grants: at the limit of a user's processes (`ulimit -u`) it refuses
 /// them. Without any the calling thread does the work. Where it limits the address space (`ulimit -v`), they take no more than
-/// a quarter of it, with as many to render.
+/// a quarter of it, and the same number to render.
 pub(crate) fn start() {
     let cores = cores();
     let fit = address_space_left().map_or(cores, |left| (left / (4 * ADDRESS_SPACE)) as usize);
@@ -19,7 +19,7 @@ pub(crate) fn start() {
     let started = if granted == cores {
         pool.build_global()
     } else {
-        // One is left to watch for signals, and as many as here to render.
+        // One is left to watch for signals, and the same number to render.
         match granted.saturating_sub(1) / 2 {
             0 => pool.num_threads(1).use_current_thread().build_global(),
             count => pool.num_threads(count).build_global(),

@@ -1,4 +1,4 @@
-//! Wrong words on the command line: what was meant, by meaning where other programs have the word, else by spelling.
+//! Suggests an option for a wrong one: first by synonyms from other programs, then by spelling.
 
 use std::ffi::OsString;
 use std::io::{self, Write};
@@ -124,7 +124,7 @@ pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Resul
     };
     read(arguments).map_err(|mut error| {
         // What the user wrote is in the message, where it must not drive the terminal; in a styled message it can no
-        // longer be told from the styles.
+        // longer be distinguished from the styles.
         let harmless: Vec<OsString> = arguments
             .iter()
             .map(|argument| escaped(&argument.to_string_lossy()).into_owned().into())
@@ -208,9 +208,9 @@ fn give_tip(error: &mut Error, command: &Command) {
 /// What a wrong option is answered with.
 #[derive(Debug, PartialEq)]
 enum Tip {
-    /// The option that it resembles.
+    /// The option of similar spelling.
     Spelling(String),
-    /// The option that does what it does elsewhere.
+    /// The option with the same meaning.
     Meaning(String),
     /// What helps instead.
     Hint(&'static str),
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn no_option_is_given_a_tip_for() {
+    fn known_options_get_no_tip() {
         for command in crate::Arguments::command().get_subcommands() {
             let options: Vec<String> = command
                 .get_arguments()

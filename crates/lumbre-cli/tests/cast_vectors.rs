@@ -138,7 +138,7 @@ fn cast(folder: &Path, record: &Value, query: &str) -> Vec<Vec<String>> {
     stdout.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }
 
-/// The crossings that `lumbre explain` tells of a record's ray: t and normal.
+/// The crossings that `lumbre explain` prints for a record's ray: t and normal.
 fn explained(folder: &Path, record: &Value) -> Vec<(f64, Vec<f64>)> {
     let scene_path = folder.join("scene.pbrt");
     std::fs::write(&scene_path, scene(record)).unwrap();

@@ -1,4 +1,4 @@
-//! `lumbre explain`: what it tells is what the render does, in every form and language.
+//! `lumbre explain` reports what the render does, in every format and language.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -85,7 +85,7 @@ fn the_radiance_that_is_told_is_that_of_the_picture_to_the_bit() {
             list(quantity(radiance, label)).iter().map(|x| x.as_f64().unwrap() as f32).collect();
         assert_eq!(rgb, pixels[(15 - y) * 24 + x], "({x}, {y})");
         lit += u32::from(rgb[1] > 0.0);
-        // What is added sums to it, in the order that it is told in.
+        // The contributions sum to it, in their order.
         let added = list(&radiance["tables"]["added"]);
         let sum = added.iter().fold([0.0_f32; 3], |sum, row| {
             std::array::from_fn(|i| sum[i] + row["added"][i].as_f64().unwrap() as f32)
@@ -145,7 +145,7 @@ fn glass_tells_its_refraction_and_shadows_what_is_in_their_way() {
     // Snell: the sines of both angles are as 1.5 to 1. The ball's normal is a quarter over a half off the axis: a sine of 1/2.
     let cosine: f64 = -normal.iter().zip(&refracted).map(|(n, t)| n * t).sum::<f64>();
     assert!(((1.0 - cosine * cosine).sqrt() - 0.5 / 1.5).abs() < 1e-6, "{cosine}");
-    // The rays that follow are told too.
+    // The rays that follow are explained too.
     assert!(section(section(&told, "vertex 1").unwrap(), "surfaces").is_some());
     // From the front the lamps are seen, from below the clay is in the way of both.
     let seen = |ray: &str| -> Vec<bool> {

@@ -13,7 +13,7 @@ use crate::parts::{bytes, done, folder};
 const RENDER: &str = "render scene.pbrt --size 20x14 --spp 40 --threads 1 -q --progress none -o out.exr --checkpoint ck \
                       --checkpoint-every 5ms";
 
-/// What the system is told to do with a call. (Short writes are tried where the calls are made, in the crate that reads and writes.)
+/// What the system does with a call. (Short writes are tried where the calls are made, in the crate that reads and writes.)
 const FAULTS: [&str; 9] = [
     // Of libraries, of the scene, and of what is written: there are many.
     "openat:error=ENOSPC",

@@ -64,7 +64,7 @@ fn channels_are_named_as_in_pbrt_and_files_say_what_they_are() {
     }
     expected.extend(["RelativeVariance.R", "RelativeVariance.G", "RelativeVariance.B"]);
     expected.sort_unstable();
-    // Beside the scene, with an ending that holds them.
+    // Next to the scene, with a format that holds them.
     let mut found = channels(&bytes(&folder, "surfaces.exr"));
     found.sort_unstable();
     assert_eq!(found, expected);

@@ -107,7 +107,7 @@ fn reference_vectors_hold() {
         checks.add(euler.clone(), &r["quaternion"]);
         checks.add(format!("matrix({euler})"), &r["matrix3"]);
         checks.add(format!("matrix(euler(angles({euler})))"), &r["matrix3"]);
-        // Beside a pole, not at it, single angles are uncertain by about 1e-16 / cos(attitude).
+        // Next to a pole, not at it, single angles are uncertain by about 1e-16 / cos(attitude).
         let attitude = r["attitude_deg"].as_f64().unwrap().abs();
         if attitude < 89.0 || !r["pole"].is_null() {
             checks.add(format!("angles({euler})"), &r["recovered_deg"]);

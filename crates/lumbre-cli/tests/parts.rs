@@ -256,7 +256,7 @@ fn forged(folder: &Folder, (width, height): (u32, u32)) -> Vec<u8> {
         bytes
     };
     let planes = (0..99).find(|&planes| lumbre::Part::from_bytes(&sealed(head, planes), u64::MAX).is_ok());
-    // As many for each strip of sixteen rows, of which the small one has one.
+    // One for each strip of sixteen rows; the small picture has one strip.
     let planes = planes.map(|planes| planes * height.div_ceil(16) as usize);
     let mut head = head.to_vec();
     head[8..12].copy_from_slice(&width.to_le_bytes());
@@ -399,7 +399,7 @@ mod interrupted {
             }
         }
         assert!(held > 0, "it never kept anything");
-        // As many samples as the killed runs came to and a few more: the rest is rendered by one run.
+        // The samples of the killed runs and a few more: the rest is rendered by one run.
         let most = lumbre::Part::open(&folder.path("ck"), |_| u64::MAX).unwrap().state.most_samples();
         refused(
             &folder,

@@ -310,7 +310,7 @@ fn info_counts_what_is_there() {
     let plain = desk.lumbre(&["info", "scene.pbrt"]);
     let plain = stdout(&plain);
     assert!(plain.contains("2 sphere") && plain.contains("48x32"), "{plain}");
-    // A model is measured as it would be shown; what cannot be a picture is still told about.
+    // A model is measured as it would be shown; what cannot be rendered is still described.
     desk.write("model.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let model: Value = serde_json::from_str(&stdout(&desk.lumbre(&["info", "model.obj", "--json"]))).unwrap();
     assert_eq!(model["picture"]["width"].as_u64(), Some(1200), "{model}");
@@ -649,7 +649,7 @@ fn frames_show_their_time_and_motion_blur_on_request() {
         assert_eq!(code(&out), 0, "{}", stderr(&out));
         stderr(&out)
     };
-    // Four frames a second, of which frames 1 to 3 are a quarter, a half and three quarters of a second.
+    // At four frames a second, frames 1 to 3 are at a quarter, a half and three quarters of a second.
     let said = render(&["--frames", "1..3", "--fps", "4", "-o", "f.###.pfm"]);
     assert!(said.contains("frame 1 (1 of 3)") && said.contains("frame 3 (3 of 3, "), "{said}");
     assert!(!desk.path("f.000.pfm").exists() && !desk.path("f.004.pfm").exists());

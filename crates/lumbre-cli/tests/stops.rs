@@ -209,7 +209,7 @@ fn every_end_signal_keeps_picture_and_checkpoint() {
         "--checkpoint-every",
         "20ms",
     ];
-    // Those that come more than once end it no earlier.
+    // Repeated signals end it no earlier.
     for (name, status, times) in
         [("HUP", 129, 3), ("QUIT", 131, 1), ("USR1", 138, 3), ("XCPU", 152, 3), ("TERM", 143, 1)]
     {

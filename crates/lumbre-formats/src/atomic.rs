@@ -18,7 +18,7 @@ use crate::diagnostic::FormatError;
 ///
 /// # Errors
 /// [`FormatError::Io`]; the path then holds what it held before, unless only syncing the folder failed. A
-/// process that is killed may leave a file `.NAME.….lumbre.part` beside it, which the next write into that folder
+/// process that is killed may leave a file `.NAME.….lumbre.part` next to it, which the next write into that folder
 /// removes.
 pub fn atomic_write(
     path: &Path,
@@ -216,7 +216,7 @@ pub fn atomic_write_seek(
     .map_err(refuse)
 }
 
-/// Writes a file beside `real`; `end` then puts it in the place of `real`, or removes it.
+/// Writes a file next to `real`; `end` then renames it to `real`, or removes it.
 fn replace<D: Disk>(
     disk: &D,
     real: &Path,

@@ -368,7 +368,7 @@ impl Hold<'_> {
         self.budget.release(std::mem::take(&mut self.bytes));
     }
 
-    /// Room for one more value in `vec`, charged before it is taken. It doubles, as a vector does by itself.
+    /// Room for one more value in `vec`, charged before it is taken. It doubles, as `Vec` does.
     ///
     /// # Errors
     /// As for [`Budget::bytes`], and when the allocator refuses.
@@ -438,7 +438,7 @@ impl<'b, T> BudgetVec<'b, T> {
     #[inline]
     pub fn push(&mut self, value: T) -> Result<(), LimitError> {
         if self.vec.len() == self.vec.capacity() {
-            // One, four, and twice as many from there: files may have very many lists of one.
+            // One, four, then doubled: files may have very many lists of one.
             self.grow(match self.vec.len() {
                 0 => 1,
                 1 => 3,

@@ -5,7 +5,7 @@ use std::path::{Component, Path, Prefix};
 /// A device that Windows opens in place of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Device {
-    /// `NUL` by itself, which takes everything and keeps nothing.
+    /// `NUL` alone, which discards everything.
     Null,
     /// Any other: a console, a port, a pipe, or a name such as `nul.png`, which some versions take for `NUL`.
     Other,

@@ -101,8 +101,8 @@ fn walked(text: &[u8], range: std::ops::Range<usize>, (mut line, mut column): (u
     (line, column)
 }
 
-/// The places of one text, for readers that name many of them: as [`Place::of_offset`], but the time of all
-/// together is that of one pass over the text and a little for each.
+/// The places of one text, for readers that name many of them: as [`Place::of_offset`], but all
+/// look-ups together take one pass over the text.
 #[derive(Debug, Default)]
 pub(crate) struct TextPlaces {
     /// The line and column of every byte whose offset is a multiple of [`TextPlaces::STEP`], as far as known.
@@ -143,11 +143,11 @@ impl Display for Place {
 /// The severity of a diagnostic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Severity {
-    /// The input can be used, though part of it was ignored.
+    /// The input can be used, but a part of it is ignored.
     Warning,
     /// The input cannot be used.
     Error,
-    /// A flaw that changes no picture and no answer: [`Strictness::Strict`] passes it.
+    /// A flaw that changes no picture and no answer: [`Strictness::Strict`] ignores it.
     Note,
 }
 
@@ -427,7 +427,7 @@ impl Diagnostics {
         self.strictness == Strictness::Lenient
     }
 
-    /// The files that were read for a scene, each as it was named: its own, and those that these name. Also those that were
+    /// The files that were read for a scene, by the names given: its own, and the files that they name. Also files that were
     /// missing.
     pub fn files_read(&self) -> &[PathBuf] {
         &self.files
@@ -450,7 +450,7 @@ impl Diagnostics {
         self.push_with(severity, &message, || diagnostic);
     }
 
-    /// Adds a warning of this kind. `make` is called only if it is kept: finding a place can be slow.
+    /// Adds a warning of this kind. `make` is called only if this one is kept: finding a place can be slow.
     pub fn warn(&mut self, message: &str, make: impl FnOnce(Diagnostic) -> Diagnostic) {
         self.push_with(Severity::Warning, message, || make(Diagnostic::warning(message)));
     }
@@ -539,10 +539,10 @@ impl Diagnostics {
                 format!("{severity}: {message} ({} more)", count - Self::KEPT_OF_A_KIND)
             }));
         }
-        let said: u64 = self.kinds.iter().flat_map(HashMap::values).sum();
-        let unsaid = self.warnings + self.errors + self.notes - said;
-        if unsaid > 0 {
-            lines.push(format!("warning: {unsaid} more of other kinds"));
+        let counted: u64 = self.kinds.iter().flat_map(HashMap::values).sum();
+        let uncounted = self.warnings + self.errors + self.notes - counted;
+        if uncounted > 0 {
+            lines.push(format!("warning: {uncounted} more of other kinds"));
         }
         lines
     }

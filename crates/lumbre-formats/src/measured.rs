@@ -45,7 +45,7 @@ pub fn read(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<MeasuredTa
     let vndf = file.numbers("vndf", &each, Sign::NotNegative, hold)?;
     let luminance = file.numbers("luminance", &each, Sign::NotNegative, hold)?;
     let of_colour = luminance.last_two();
-    // The tables are copied, and the densities have an integral beside each number.
+    // The tables are copied, and the densities have an integral for each number.
     let numbers = 2 * (vndf.values.len() + luminance.values.len()) + ndf.values.len() + sigma.values.len();
     let colours = 3 * luminance.values.len();
     budget.bytes(((numbers + colours) * size_of::<f32>()) as u64, "measured material")?;

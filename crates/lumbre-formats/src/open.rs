@@ -23,7 +23,7 @@ pub struct ReadOptions {
     pub strictness: Strictness,
     /// The resource limits.
     pub limits: Limits,
-    /// The format of what has no extension that tells it, such as standard input; `None` to tell it by the bytes.
+    /// The format of input without a known extension, such as standard input; `None` to recognise it by its bytes.
     pub format: Option<SceneFormat>,
     /// The time in seconds at which animations are evaluated; `None` ignores them.
     pub frame: Option<f64>,
@@ -35,9 +35,9 @@ pub struct ReadOptions {
     pub variant: Option<String>,
     /// Options of a POV-Ray scene.
     pub pov: crate::pov::PovOptions,
-    /// Whether the scene may use no other files than those that are named: for a scene from a stranger.
+    /// Whether the scene may read only the named files: for a scene from a stranger.
     pub only_named_files: bool,
-    /// A folder, besides, whose files it may use all the same: one that holds no links.
+    /// Another folder whose files the scene may use; it must hold no links.
     pub folder: Option<PathBuf>,
     /// The files in place of the system's; `None` for those of the system.
     pub held: Option<Arc<HeldFiles>>,
@@ -129,7 +129,7 @@ fn may_begin_an_stl(bytes: &[u8], most: u64) -> bool {
 }
 
 /// Reads the scene or the mesh in the file `path`: `.pbrt`, `.ply` and `.stl`, each also with `.gz`, `.gltf`,
-/// `.glb` and `.obj`. A file with another extension is told by its bytes, and so is `-`, standard input.
+/// `.glb` and `.obj`. A file with another extension is recognised by its bytes, and so is standard input, `-`.
 ///
 /// Returns the description and the diagnostics: the warnings, their counts, and the files that were read.
 ///
@@ -140,7 +140,7 @@ pub fn open_scene(path: &Path, options: &ReadOptions) -> Result<(SceneDesc, Diag
 }
 
 /// Reads several scene files as one scene: those in the pbrt language one after another as if they were one, each
-/// of the others by itself; [`SceneDesc::append`] says how they are joined.
+/// independently of the others; [`SceneDesc::append`] says how they are joined.
 ///
 /// # Errors
 /// As for [`open_scene`], and when there is no file at all.
@@ -179,7 +179,7 @@ pub fn open_scenes(
     Ok((scene, diagnostics))
 }
 
-/// Whether there is a file of this name that can be read as a scene, as far as its name tells, or else its bytes: it is not parsed.
+/// Whether there is a file of this name that can be read as a scene, judged by its name, or else by its bytes; it is not parsed.
 ///
 /// # Errors
 /// As for [`open_scene`].
@@ -191,7 +191,7 @@ pub fn check_scene_file(path: &Path, options: &ReadOptions) -> Result<(), Format
     Ok(())
 }
 
-/// A file to read, or what was read already to tell its format.
+/// A file to read, or the bytes that were read to recognise its format.
 struct Source<'p, 'b> {
     path: &'p Path,
     format: SceneFormat,

@@ -70,12 +70,12 @@ fn turns_one_way(flat: &[DVec2]) -> bool {
     left && (1..count - 1).all(|i| area(flat[0], flat[i], flat[i + 1]) >= 0.0)
 }
 
-/// The reflex corners in a square grid over the polygon, of about as many cells as corners.
+/// The reflex corners in a square grid over the polygon, with about one cell per corner.
 struct Reflex {
     least: DVec2,
     cells_per_length: DVec2,
     side: usize,
-    /// Corners by cell, including those that are no longer reflex.
+    /// Corners by cell, including ones that are no longer reflex.
     cells: Vec<Vec<u32>>,
     is_reflex: Vec<bool>,
 }

@@ -231,7 +231,7 @@ impl<'b> Welded<'b> {
             let [x, y, z] = p.to_array().map(f32::to_bits);
             let [r, g, b] = colour_bits;
             if self.known.len() == self.known.capacity() {
-                // The size after the next growth: twice as many, each with its key, number and mark.
+                // The size after the next growth: doubled, each entry with its key, number and mark.
                 let bytes = (self.known.capacity().max(3) as u64 * 2 + 8) * 29;
                 self.budget.bytes(bytes, "vertices")?;
                 self.budget.release(self.known_charged);

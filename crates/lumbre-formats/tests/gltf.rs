@@ -1037,7 +1037,7 @@ fn lights_that_animations_move_are_seen_moving() {
     let [lamp, sun, ..] = scene.lights() else { panic!("two lights are expected") };
     for part in [0.0, 0.25, 0.5, 1.0] {
         let share = 0.25 + 0.5 * part;
-        // 2 above the floor, 1 beside the lamp.
+        // 2 above the floor, 1 to the side of the lamp.
         let floor = DVec3::new(2.0 + 8.0 * share, 4.0, 2.0);
         let found = lamp.irradiance(floor, part, DVec3::Z).unwrap().g;
         let expected = 8.0 * 2.0 / 5.0_f64.powf(1.5);

@@ -50,7 +50,7 @@ fn every_valid_asset_reads_and_builds() {
 
 /// What reading may cost: 64 MiB and 32 times the size of the files.
 fn bounded(path: &Path) -> (Result<SceneDesc, String>, Duration, f64) {
-    // Buffers and images lie beside the file.
+    // Buffers and images are next to the file.
     let beside = std::fs::read_dir(path.parent().unwrap()).unwrap();
     let size: u64 = beside.map(|entry| entry.unwrap().metadata().unwrap().len()).sum();
     let budget = Budget::default();

@@ -291,7 +291,7 @@ fn exr_values_stay_finite_and_qoi_keeps_its_bytes() {
     assert!((read(&bytes, "a.qoi").pixel(4, 2) - shown.pixel(4, 2)).map(f32::abs).max_component() < 1e-6);
 }
 
-/// A scene whose texture, area light, environment and goniometric light are the image file `name`, written beside it.
+/// A scene whose texture, area light, environment and goniometric light are the image file `name`, written next to it.
 fn scene_of_image(file: &str, bytes: &[u8]) -> (lumbre_scene::SceneDesc, Vec<String>) {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join(file), bytes).unwrap();

@@ -437,7 +437,7 @@ fn what_is_not_finite_where_nothing_is_seen_is_a_note() {
         assert_eq!(said.check().is_ok(), said.warnings() == 0);
         (said.warnings(), notes)
     };
-    // Beside a face that is seen, with other normals, or none.
+    // Next to a visible face, with other normals, or none.
     assert_eq!(check("f 1/2/2 2/2/2 4/2/2\nf 1/1/1 2/1/1 3/1/1\n"), (0, 2));
     assert_eq!(check("f 1 2 4\nf 1//1 2//1 3//1\n"), (0, 2));
     assert_eq!(check("f 1//2 2//1 4//2\n"), (1, 1));

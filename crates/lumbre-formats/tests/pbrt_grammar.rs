@@ -787,7 +787,7 @@ fn rgb_lights_keep_numbers_and_spectra_become_one_nit() {
         LightDesc::Point { intensity, .. } => *intensity,
         other => panic!("{other:?}"),
     };
-    // A spectrum is kept beside the colour.
+    // A spectrum is kept in addition to the colour.
     let has_spectrum = |i: usize| matches!(scene.lights[i], LightDesc::Spectral { .. });
     assert_eq!([0, 1, 2, 3, 4].map(has_spectrum), [false, true, true, true, false]);
     near_rgb(intensity(0), [6.0, 8.0, 10.0]);

@@ -325,7 +325,7 @@ fn measure_reading() {
     }
 }
 
-/// The scene of a text, written beside an image of one pixel.
+/// The scene of a text, written next to an image of one pixel.
 fn open_text(text: &str) -> (lumbre_scene::SceneDesc, Vec<String>) {
     let dir = tempfile::tempdir().unwrap();
     let pixel = image::RgbImage::from_raw(1, 1, vec![255, 0, 0]).unwrap();
@@ -472,7 +472,7 @@ fn colours_of_faces_are_those_of_their_corners() {
     assert!(all(&mesh.triangles[0], red) && all(&mesh.triangles[1], blue));
     assert!(all(&mesh.quads[0], red), "{list:?}");
 
-    // Texture coordinates of corners beside them; floats are linear.
+    // Texture coordinates of corners too; floats are linear.
     let floats =
         "property float red\nproperty float green\nproperty float blue\nproperty list uchar float texcoord\n";
     let faces =

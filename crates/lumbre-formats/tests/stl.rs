@@ -139,7 +139,7 @@ fn files_of_others_are_read() {
             })
             .sum();
         let stem = path.file_stem().unwrap().to_string_lossy().into_owned();
-        // Those that are there as text and as binary are the same.
+        // Text and binary versions are the same.
         if let Some(other) = triangles.insert(stem.clone(), count) {
             assert_eq!(other, count, "{stem}");
         }

@@ -1,7 +1,7 @@
 //! How many rays a second each shape answers: `cargo run --release -p lumbre-geometry --example shape_speed`.
 //!
-//! One thread; for each shape the same random rays through a ball about it, and the fastest of many short passes, which a
-//! busy machine disturbs least.
+//! One thread; for each shape the same random rays through a ball about it, and the fastest of many short passes, which
+//! a busy machine disturbs least.
 
 use std::hint::black_box;
 use std::time::Instant;

@@ -42,9 +42,9 @@ impl Aabb {
 
     /// Where a ray enters and leaves the closed box, within the ray's range; `None` if it has no point in it.
     ///
-    /// Between the two planes of an axis is a slab, and the box is what the slabs have in common: T. L. Kay, J. T. Kajiya, "Ray
-    /// tracing complex scenes", SIGGRAPH 1986. A ray along a slab is in it everywhere or nowhere, which is decided without dividing
-    /// by zero. Each end is wrong by no more than three roundings.
+    /// Between the two planes of an axis is a slab, and the box is what the slabs have in common: T. L. Kay, J. T.
+    /// Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986. A ray along a slab is in it everywhere or nowhere, which is
+    /// decided without dividing by zero. Each end is wrong by no more than three roundings.
     pub fn slabs(&self, ray: &Ray) -> Option<[f64; 2]> {
         let (mut enter, mut leave) = (ray.t_min, ray.t_max);
         for axis in 0..3 {

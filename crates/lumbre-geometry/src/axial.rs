@@ -51,8 +51,8 @@ pub(crate) const CAP2: u32 = 2;
 /// The interval of a line inside a convex set: its two ends in order of `t`, each with the part that bounds it.
 pub(crate) type Span = [(f64, u32); 2];
 
-/// What one nappe has of a line that crosses the double cone at two places, or misses it; `radius` is the signed radius at the
-/// middle of the crossings, and `growth` that of the radius along the line.
+/// What one nappe has of a line that crosses the double cone at two places, or misses it; `radius` is the signed radius
+/// at the middle of the crossings, and `growth` that of the radius along the line.
 #[inline]
 fn nappe(a: f64, pair: Option<(f64, f64)>, growth: f64, radius: f64) -> Option<Span> {
     let (first, second) = pair?;
@@ -249,8 +249,8 @@ impl Axial {
 
     /// The interval of the line within the lateral surface of one nappe, without cuts.
     ///
-    /// The [`Equation`] is set up at the ray's origin if that is near, else about the middle of the crossings, where the
-    /// discriminant keeps its digits for a thin cone far away; where they do not suffice, in twice the precision.
+    /// The [`Equation`] is set up at the ray's origin if that is near, else about the middle of the crossings, where
+    /// the discriminant keeps its digits for a thin cone far away; where they do not suffice, in twice the precision.
     #[inline]
     pub(crate) fn lateral_span(&self, ray: &Ray) -> Option<Span> {
         let (start, p, slack) = self.set_up(ray);
@@ -259,8 +259,8 @@ impl Axial {
         self.cut_at_apex(ray, decided.unwrap_or_else(|| self.exact_side(ray, start, p).span(self.caps))?)
     }
 
-    /// Where the equation is set up: the parameter, the place there relative to p1, and how far that may be off, in units of the
-    /// unit roundoff.
+    /// Where the equation is set up: the parameter, the place there relative to p1, and how far that may be off, in
+    /// units of the unit roundoff.
     #[inline(always)]
     pub(crate) fn set_up(&self, ray: &Ray) -> (f64, DVec3, DVec3) {
         let (w, d) = (ray.origin - self.p1, ray.direction);
@@ -272,7 +272,8 @@ impl Axial {
         }
     }
 
-    /// The equation of the lateral surface in twice the precision, or in doubles at the place `p` by `start` for want of that.
+    /// The equation of the lateral surface in twice the precision, or in doubles at the place `p` by `start` for want
+    /// of that.
     #[cold]
     #[inline(never)]
     pub(crate) fn exact_side(&self, ray: &Ray, start: f64, p: DVec3) -> ExactSide {
@@ -423,7 +424,7 @@ impl Axial {
 
     /// The height above p1 of the point at `t`, and its offset from the axis.
     pub(crate) fn arm(&self, ray: &Ray, t: f64, part: u32) -> (f64, DVec3) {
-        // Near a pointed end the offset is small beside the way from the other.
+        // Near a pointed end the offset is small compared with the distance from the other.
         let from_2 = part == CAP2 || self.r2 == 0.0;
         let base = if from_2 { self.p2 } else { self.p1 };
         let lift = if from_2 && part == LATERAL { self.length } else { 0.0 };

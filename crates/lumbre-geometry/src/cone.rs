@@ -24,7 +24,7 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// The frustum with radius `r0` at `p0` and `r1` at `p1`, one of which may be 0, with disks at its ends of
+    /// The frustum with radius `r0` at `p0` and `r1` at `p1`, where one may be 0, with disks at its ends of
     /// non-zero radius if `caps`.
     ///
     /// # Errors
@@ -50,12 +50,12 @@ impl Cone {
         })
     }
 
-    /// The pointed cone that opens from `apex` along `axis` (of any non-zero length), up to `height` along it, which may be
-    /// infinite. The angle between the axis and the side is `half_angle` in degrees, between 0 and 90.
+    /// The pointed cone that opens from `apex` along `axis` (of any non-zero length), up to `height` along it, which
+    /// may be infinite. The angle between the axis and the side is `half_angle` in degrees, between 0 and 90.
     ///
     /// # Errors
-    /// [`ShapeError`] unless the apex is finite, the axis finite and not zero, the angle within its range, and the height
-    /// greater than 0.
+    /// [`ShapeError`] unless the apex is finite, the axis finite and not zero, the angle within its range, and the
+    /// height greater than 0.
     pub fn nappe(
         apex: DVec3,
         axis: DVec3,

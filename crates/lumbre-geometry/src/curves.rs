@@ -23,15 +23,17 @@ pub enum CurveKind {
 
 /// Curves of one kind, each of one or more cubic Bézier segments.
 ///
-/// A ray crosses a segment where the segment passes it nearest by half its width or less, measured across the ray, and at the depth of
-/// the segment's axis there: what is crossed is a ribbon about the axis that is turned to the ray, or for [`CurveKind::Ribbon`] one as
-/// wide as a ribbon of its own normal looks. Ends are cut across the axis. The place is a root of a polynomial, bracketed by planes which
-/// neighbouring pieces share, so no ray passes between two of them, and the answers do not depend on how segments are cut for a tree.
+/// A ray crosses a segment where the segment passes it nearest by half its width or less, measured across the ray, and
+/// at the depth of the segment's axis there: what is crossed is a ribbon about the axis that is turned to the ray, or
+/// for [`CurveKind::Ribbon`] one as wide as a ribbon of its own normal looks. Ends are cut across the axis. The place
+/// is a root of a polynomial, bracketed by planes which neighbouring pieces share, so no ray passes between two of
+/// them, and the answers do not depend on how segments are cut for a tree.
 ///
 /// Control points have single precision, relative to an origin in double precision.
 ///
-/// Ribbons that face the ray, ends and normals are those of M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th edition,
-/// 2023, section 6.7. There the curve is a chain of chords; here its nearest point is found, by Newton's method.
+/// Ribbons that face the ray, ends and normals are those of M. Pharr, W. Jakob, G. Humphreys, "Physically Based
+/// Rendering", 4th edition, 2023, section 6.7. There the curve is a chain of chords; here its nearest point is found,
+/// by Newton's method.
 #[derive(Clone)]
 pub struct Curves {
     kind: CurveKind,
@@ -75,7 +77,8 @@ impl Curves {
         }
     }
 
-    /// Adds a curve. What single precision cannot hold is rounded: control points relative to the first point of the first curve.
+    /// Adds a curve. What single precision cannot hold is rounded: control points relative to the first point of the
+    /// first curve.
     ///
     /// # Errors
     /// [`ShapeError`] for points that are too far from the first, and for a ribbon without normals.
@@ -140,8 +143,8 @@ impl Curves {
         }
     }
 
-    /// The same curves, each segment in 2^`splits` primitives; at most 64. More primitives have tighter boxes and take more memory. They
-    /// change no answer.
+    /// The same curves, each segment in 2^`splits` primitives; at most 64. More primitives have tighter boxes and take
+    /// more memory. They change no answer.
     #[must_use]
     pub fn with_splits(mut self, splits: u32) -> Self {
         let most = (u32::MAX / self.segments.len().max(1) as u32).ilog2();
@@ -256,10 +259,11 @@ impl Curves {
         out.extend(search.found);
     }
 
-    /// The surface at a crossing: the normal of a ribbon, or one that faces the ray; u along the segment and v across it, each in [0, 1].
+    /// The surface at a crossing: the normal of a ribbon, or one that faces the ray; u along the segment and v across
+    /// it, each in [0, 1].
     ///
-    /// Where exactly light leaves a fibre is not modelled. The error of the point is so large that rays leave it by more than the
-    /// width, so no curve shades itself.
+    /// Where exactly light leaves a fibre is not modelled. The error of the point is so large that rays leave it by
+    /// more than the width, so no curve shades itself.
     pub fn surface(&self, primitive: u32, ray: &Ray, root: &Root) -> Surface {
         let DVec2 { x: u, y: v } = root.local;
         let p = self.control_points(primitive);
@@ -357,7 +361,8 @@ struct Piece {
     cubic: Cubic,
     /// Its parameters in the segment.
     u: [f64; 2],
-    /// Normals, in the plane across the ray, of the lines that cut it off at its ends; those of neighbours are the same to the bit.
+    /// Normals, in the plane across the ray, of the lines that cut it off at its ends; those of neighbours are the same
+    /// to the bit.
     cuts: [DVec2; 2],
     /// How often it may be halved.
     depth: u32,
@@ -485,7 +490,8 @@ impl<'a> Search<'a> {
     /// The place of a piece that the ray passes nearest, if that is between its ends.
     fn nearest(&mut self, piece: &Piece) {
         let Piece { cubic: p, u: [u0, u1], cuts: [start, end], .. } = piece;
-        // Half the derivative of the squared distance, with the sign changed: it falls through zero where the distance is least.
+        // Half the derivative of the squared distance, with the sign changed: it falls through zero where the distance
+        // is least.
         let ahead = |p: DVec3, tangent: DVec2| -p.truncate().dot(tangent);
         // What is exactly on a cut belongs to the piece before it, if there is one.
         let is_open = self.is_first && *u0 == 0.0 && ahead(p[0], *start) == 0.0;
@@ -554,8 +560,8 @@ impl Piece {
         ]
     }
 
-    /// Whether the squared distance to the ray has no more than one minimum or maximum within it: its second derivative keeps its sign,
-    /// as the coefficients of that polynomial in Bernstein's basis do.
+    /// Whether the squared distance to the ray has no more than one minimum or maximum within it: its second derivative
+    /// keeps its sign, as the coefficients of that polynomial in Bernstein's basis do.
     fn has_one_place(&self) -> bool {
         let p = self.cubic.map(|p| p.truncate());
         let a = [3.0 * (p[1] - p[0]), 3.0 * (p[2] - p[1]), 3.0 * (p[3] - p[2])];

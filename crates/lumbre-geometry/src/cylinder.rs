@@ -39,7 +39,7 @@ impl Cylinder {
         Ok(Self { body: Axial { cut1: true, cut2: true, caps, ..body } })
     }
 
-    /// pbrt's cylinder about the z axis from `zmin` to `zmax` (in either order), either of which may be infinite, with
+    /// pbrt's cylinder about the z axis from `zmin` to `zmax` (in either order; either may be infinite), with
     /// disks at its finite ends if `caps`.
     ///
     /// # Errors

@@ -53,8 +53,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The surface at a point, by its normal alone, of any length: flat, without parameters, and with a bound on the point's error of a few
-    /// units in its last place. For custom geometry that has no more to say.
+    /// The surface at a point, by its normal alone, of any length: flat, without parameters, and with a bound on the
+    /// point's error of a few units in its last place. For custom geometry that has no more to say.
     ///
     /// ```
     /// use lumbre_geometry::Surface;

@@ -14,11 +14,12 @@ type Function = dyn Fn([Dual; 3]) -> Dual + Send + Sync;
 
 /// The part of a surface `F(x, y, z) = 0` that lies in a box; outside is where `F` is positive.
 ///
-/// `F` is written once, as a function of [`Dual`]s, which give bounds of its value and of its slope along a ray. So a ray's
-/// crossings are isolated with certainty: a piece of the ray is dropped only where the bounds of `F` exclude zero, and taken as one
-/// crossing where those of the slope do and the ends differ in sign; other pieces are halved. No crossing is lost, however close to
-/// another, down to a few neighbouring numbers of `t`. Where the surface is only touched, `F` has one sign on both sides, and there is
-/// no crossing. Source: D. Mitchell, "Robust Ray Intersection with Interval Arithmetic", Graphics Interface, 1990.
+/// `F` is written once, as a function of [`Dual`]s, which give bounds of its value and of its slope along a ray. So a
+/// ray's crossings are isolated with certainty: a piece of the ray is dropped only where the bounds of `F` exclude
+/// zero, and taken as one crossing where those of the slope do and the ends differ in sign; other pieces are halved. No
+/// crossing is lost, however close to another, down to a few neighbouring numbers of `t`. Where the surface is only
+/// touched, `F` has one sign on both sides, and there is no crossing. Source: D. Mitchell, "Robust Ray Intersection
+/// with Interval Arithmetic", Graphics Interface, 1990.
 ///
 /// ```
 /// use lumbre_geometry::{Aabb, ImplicitSurface, Ray};
@@ -39,8 +40,8 @@ pub struct ImplicitSurface {
     function: Arc<Function>,
 }
 
-/// Evaluations after which what is left of a ray is decided by the signs at its ends alone: more are needed only along a ray that
-/// lies in the surface, or nearly.
+/// Evaluations after which what is left of a ray is decided by the signs at its ends alone: more are needed only along
+/// a ray that lies in the surface, or nearly.
 const MAX_EVALUATIONS: u32 = 1 << 14;
 
 impl ImplicitSurface {
@@ -95,7 +96,8 @@ impl ImplicitSurface {
         roots
     }
 
-    /// The surface where a root was found along a ray. Its parameters are zero, and so are the derivatives of its normal.
+    /// The surface where a root was found along a ray. Its parameters are zero, and so are the derivatives of its
+    /// normal.
     pub fn surface(&self, ray: &Ray, root: &Root) -> Surface {
         let point = ray.at(root.t);
         let normal = self.gradient(point).try_normalize().unwrap_or_else(|| {
@@ -158,7 +160,7 @@ impl ImplicitSurface {
         }
     }
 
-    /// The place where a piece with one crossing changes its side: to the last bit that rounding lets `F` tell.
+    /// Where a piece with one crossing changes its side: to the last bit that the rounding of `F` allows.
     fn refine(&self, ray: &Ray, mut from: f64, mut to: f64, begins_inside: bool) -> f64 {
         loop {
             let middle = 0.5 * from + 0.5 * to;

@@ -23,9 +23,10 @@ pub(crate) trait SecondDegree {
 /// Both crossings of a ray's line in order, whatever its range: equal where it touches, infinite where there is none;
 /// `None` where it misses.
 ///
-/// The equation is set up at the ray's origin if that is near, else about the middle of the two crossings, so that it keeps its
-/// digits however far away the ray begins. Doubles with a bound of their error decide most lines, and twice the precision the others: those that nearly
-/// touch, that are nearly parallel to an asymptote or a generator, or whose digits cancel.
+/// The equation is set up at the ray's origin if that is near, else about the middle of the two crossings, so that it
+/// keeps its digits however far away the ray begins. Doubles with an error bound decide most lines, and double-double
+/// the others: those that nearly touch, that are nearly parallel to an asymptote or a generator, or whose digits
+/// cancel.
 #[inline]
 pub(crate) fn crossings(surface: &impl SecondDegree, ray: &Ray) -> Option<(f64, f64)> {
     let (start, p, slack) = set_up(surface, ray);
@@ -33,8 +34,8 @@ pub(crate) fn crossings(surface: &impl SecondDegree, ray: &Ray) -> Option<(f64, 
     doubles.crossings(start).unwrap_or_else(|| exact_crossings(surface, ray, start, p))
 }
 
-/// Where the equation is set up: the parameter, the place there relative to the base, and how far that may be off, in units of
-/// the unit roundoff.
+/// Where the equation is set up: the parameter, the place there relative to the base, and how far that may be off, in
+/// units of the unit roundoff.
 #[inline(always)]
 pub(crate) fn set_up(surface: &impl SecondDegree, ray: &Ray) -> (f64, DVec3, DVec3) {
     let (w, d) = (ray.origin - surface.base(), ray.direction);
@@ -115,8 +116,8 @@ pub(crate) fn is_nearby(a: f64, h: f64, c: f64) -> bool {
     h * h <= 4.0 * (h * h - a * c)
 }
 
-/// The parameter to set the equation up at, far away: the middle of the crossings, if that is not much farther from the surface's
-/// centre than the ray's origin, at `w` from there; else the point nearest to the centre.
+/// The parameter to set the equation up at, far away: the middle of the crossings, if that is not much farther from the
+/// surface's centre than the ray's origin, at `w` from there; else the point nearest to the centre.
 #[inline]
 pub(crate) fn start(w: DVec3, d: DVec3, a: f64, h: f64) -> f64 {
     let (middle, dd) = (-h / a, d.length_squared());
@@ -126,13 +127,14 @@ pub(crate) fn start(w: DVec3, d: DVec3, a: f64, h: f64) -> f64 {
 }
 
 /// Whether the errors of the coefficients, in units of the unit roundoff, leave both crossings their digits, where F's
-/// derivative is `slope`: the bounds may be `tolerance` units of `t`, for they are sums of absolute values, of which rounding
-/// errors hardly ever reach a tenth.
+/// derivative is `slope`: the bounds may be `tolerance` units of `t`, for they are sums of absolute values, of which
+/// rounding errors hardly ever reach a tenth.
 #[inline]
 pub(crate) fn is_exact(start: f64, roots: [f64; 2], slope: f64, [a, h, c]: [f64; 3], tolerance: f64) -> bool {
     roots.into_iter().all(|root| {
         let (s, t) = (root.abs(), (start + root).abs());
-        // A ray that starts at a crossing has no digits of that one to keep: there F is what rounding leaves of its terms.
+        // A ray that starts at a crossing has no digits of that one to keep: there F is what rounding leaves of its
+        // terms.
         if t * slope < 1e-14 * c {
             return true;
         }
@@ -196,13 +198,13 @@ impl Solution {
         self.h * self.h - self.a * self.c
     }
 
-    /// The number of which one root is q/a and the other c/q.
+    /// q: one root is q/a, the other c/q.
     pub(crate) fn q(&self) -> Twofold {
         stable(self.h, self.delta())
     }
 
-    /// The point, relative to the base, of the crossing that `t` is: not rounded on the way, which from far away would put it
-    /// anywhere on the surface.
+    /// The point, relative to the base, of the crossing that `t` is: not rounded on the way, which from far away would
+    /// put it anywhere on the surface.
     pub(crate) fn point(&self, t: f64, direction: DVec3) -> Option<DVec3> {
         let (first, second) = self.crossings?;
         let delta = self.delta();
@@ -284,8 +286,8 @@ pub(crate) fn accepted(
     near.into_iter().chain(far)
 }
 
-/// The parameter where a line crosses the plane through `point` perpendicular to `normal`, and the slope of its way along
-/// the normal, of the right sign: 0 where it is parallel, and the parameter says nothing.
+/// The parameter where a line crosses the plane through `point` perpendicular to `normal`, and the slope of its way
+/// along the normal, of the right sign: 0 where it is parallel, and the parameter says nothing.
 #[inline]
 pub(crate) fn plane_crossing(ray: &Ray, point: DVec3, normal: DVec3) -> (f64, f64) {
     let (away, along, keeps_digits) = plane_products(ray, point, normal);

@@ -124,7 +124,7 @@ fn symmetric_eigenvalues(m: DMat3) -> [f64; 3] {
     [a[0][0].max(0.0), a[1][1].max(0.0), a[2][2].max(0.0)]
 }
 
-/// Carlson's symmetric integral of the second kind R_G(x, y, z), for arguments ≥ 0 of which at most one is 0.
+/// Carlson's symmetric integral of the second kind R_G(x, y, z), for arguments ≥ 0, at most one of them 0.
 ///
 /// B. C. Carlson, "Numerical computation of real or complex elliptic integrals", Numerical Algorithms, 1995.
 fn carlson_rg(x: f64, y: f64, z: f64) -> f64 {

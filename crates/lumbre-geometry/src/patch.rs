@@ -35,7 +35,7 @@ pub struct BilinearPatch {
 pub struct PatchCrossings {
     /// In ascending order.
     pub of_line: SmallVec<[PatchCrossing; 2]>,
-    /// Whether the line lies in the patch's plane, or along one of its edges: then no place is told.
+    /// Whether the line lies in the patch's plane, or along one of its edges: then no point is given.
     pub is_edge_on: bool,
 }
 
@@ -44,8 +44,8 @@ pub struct PatchCrossings {
 pub struct PatchCrossing {
     /// The crossing.
     pub root: Root,
-    /// Whether the patch owns it. Of the faces that meet at an edge or a corner, exactly one owns a crossing there; at the border
-    /// of a surface it may have no owner.
+    /// Whether the patch owns it. Of the faces that meet at an edge or a corner, exactly one owns a crossing there; at
+    /// the border of a surface it may have no owner.
     pub is_owned: bool,
     /// Where on the outline, if it is exactly there.
     pub place: Option<PatchPlace>,
@@ -68,7 +68,7 @@ const SPHERICAL_SAMPLING: std::ops::Range<f64> = 1e-4..TAU - 1e-6;
 const CLEARANCE: f64 = 1e-7;
 
 impl BilinearPatch {
-    /// The patch with four corners, of which two may coincide.
+    /// The patch with four corners; two may coincide.
     ///
     /// # Errors
     /// [`ShapeError`] unless the corners are finite and not collinear.
@@ -113,10 +113,10 @@ impl BilinearPatch {
 
     /// How the line of a ray crosses the patch, whatever the range of the ray.
     ///
-    /// What is inside is decided by the straight edges alone, each as the triangles of a mesh decide about theirs: by the exact
-    /// sign of the edge function of its sheared end points. So a ray passes a common edge on the same side of both faces,
-    /// whichever they are. The number of times that the outline winds around the ray tells whether there is one crossing, or
-    /// none or two; the roots of a quadratic only say where.
+    /// What is inside is decided by the straight edges alone, each as the triangles of a mesh decide about theirs: by
+    /// the exact sign of the edge function of its sheared end points. So a ray passes a common edge on the same side of
+    /// both faces, whichever they are. The winding number of the outline around the ray decides whether there is one
+    /// crossing, or none or two; the roots of a quadratic only say where.
     pub fn line_crossings(&self, ray: &Ray) -> PatchCrossings {
         let mut crossings = PatchCrossings::default();
         if !(ray.origin.is_finite() && ray.direction.is_finite()) || ray.direction == DVec3::ZERO {
@@ -155,7 +155,7 @@ impl BilinearPatch {
         Sheared { corners: self.corners().map(|p| sheared.sheared(p)) }
     }
 
-    /// Finds the crossings exactly at edges and corners: those that the patch owns among what is found, and the others.
+    /// Finds the crossings exactly at edges and corners: those that the patch owns, and the others.
     #[cold]
     fn find_places(
         &self,
@@ -466,7 +466,8 @@ impl Sheared {
         winding
     }
 
-    /// a, h, c and the discriminant of a + 2 h u + c u² = 0, whose roots are the rulings of constant u that meet the ray.
+    /// a, h, c and the discriminant of a + 2 h u + c u² = 0, whose roots are the rulings of constant u that meet the
+    /// ray.
     #[inline]
     pub(crate) fn rulings(&self) -> [f64; 4] {
         let [p00, p10, p01, p11] = self.corners;
@@ -495,8 +496,8 @@ impl Sheared {
     /// The (u, v) of the crossings with their multiplicity, given whether their number is odd.
     ///
     /// A. Reshetov, "Cool patches: a geometric approach to ray/bilinear patch intersections", Ray Tracing Gems,
-    /// 2019: the rulings of constant u that the ray intersects are roots of a quadratic; the rest is linear. Theirs tests u and
-    /// v against 0 and 1, which leaks; here a root that is off by its rounding is moved into the patch.
+    /// 2019: the rulings of constant u that the ray intersects are roots of a quadratic; the rest is linear. Theirs
+    /// tests u and v against 0 and 1, which leaks; here a root that is off by its rounding is moved into the patch.
     fn inside(&self, is_odd: bool) -> [Option<(DVec2, u8)>; 2] {
         let [a, h, c, delta] = self.rulings();
         let roots = quadratic(c, h, a, delta);
@@ -541,8 +542,8 @@ impl Sheared {
         DVec2::new(u, v)
     }
 
-    /// A Newton step. A ruling of constant u almost parallel to the ray determines the crossing poorly; afterwards the error
-    /// is limited by the angle with the surface alone.
+    /// A Newton step. A ruling of constant u almost parallel to the ray determines the crossing poorly; afterwards the
+    /// error is limited by the angle with the surface alone.
     pub(crate) fn refined(&self, uv: DVec2) -> DVec2 {
         let (p, [along_u, along_v]) = (self.at(uv), self.derivatives(uv));
         let area = turn(along_u, along_v);

@@ -175,8 +175,8 @@ impl PlacedShape {
 }
 
 impl Surface {
-    /// The same surface under a map to the space around it. Its `point_error` includes the rounding of the map, and of the map back
-    /// that the next ray takes.
+    /// The same surface under a map to the space around it. Its `point_error` includes the rounding of the map, and of
+    /// the map back that the next ray takes.
     #[must_use]
     pub fn placed(&self, world_from_object: &Transform) -> Self {
         into_world(world_from_object, self)

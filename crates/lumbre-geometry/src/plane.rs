@@ -37,7 +37,7 @@ impl Plane {
     /// The first crossing in the ray's range.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Root> {
-        // No threshold is needed: near zero, `t` leaves the ray's range by itself.
+        // No threshold is needed: near zero, `t` leaves the ray's range.
         let (t, along) = plane_crossing(ray, self.point, self.normal);
         if along == 0.0 {
             return None;

@@ -27,8 +27,8 @@ use crate::{
 /// its Cholesky factor, and is parametrised like the sphere.
 ///
 /// Every other quadric is a surface whose normal is along the gradient. A box clips the surface and leaves it
-/// open; without a box it is infinite, cannot be a light, and is the boundary of the solid where the polynomial is negative, which
-/// CSG can use. It is parametrised by projection along the axis k
+/// open; without a box it is infinite, cannot be a light, and is the boundary of the solid where the polynomial is
+/// negative, which CSG can use. It is parametrised by projection along the axis k
 /// nearest to its normal: u along axis k + 1 and v along axis k + 2, cyclically, as fractions of the clipping
 /// box, or as coordinates where there is none.
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ impl Quadric {
     ///
     /// # Errors
     /// [`ShapeError`] unless all numbers are finite, one of A to I is not 0, the quadric has more than one real
-    /// point (as far as a definite quadratic form tells) and the box has a volume.
+    /// point (as a definite quadratic form shows) and the box has a volume.
     pub fn new(coefficients: [f64; 10], clip: Option<Aabb>) -> Result<Self, ShapeError> {
         if let Some(&found) = coefficients.iter().find(|x| !x.is_finite()) {
             return Err(ShapeError::OutOfRange {

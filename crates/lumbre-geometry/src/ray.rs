@@ -57,8 +57,8 @@ impl Ray {
         1e-80 < squared && squared < 1e80
     }
 
-    /// The same ray with a direction of about unit length, and the power of two that takes its `t` to the given ray's, in two
-    /// factors that are numbers; `None` for a direction that is none.
+    /// The same ray with a direction of about unit length, and the power of two that takes its `t` to the given ray's,
+    /// in two factors that are numbers; `None` for a direction that is none.
     pub(crate) fn with_direction_scaled(&self) -> Option<(Self, [f64; 2])> {
         let largest = self.direction.abs().max_element();
         if !self.direction.is_finite() || largest == 0.0 {

@@ -1,4 +1,5 @@
-//! Rays whose direction is so long or so short that its square is no number: solved with a direction of about unit length.
+//! Rays whose direction is so long or so short that its square is no number: solved with a direction of about unit
+//! length.
 
 use lumbre_math::DVec3;
 

@@ -53,7 +53,8 @@ macro_rules! shapes {
             /// How the crossings with `ray` are found, step by step, and what became of each: the hits are those of
             /// [`Shape::roots`], to the bit.
             ///
-            /// A ray whose direction is too long or too short to be squared is explained with another length, as the search takes it.
+            /// A ray whose direction is too long or too short to be squared is explained with another length, as the
+            /// search takes it.
             ///
             /// ```
             /// use lumbre_geometry::{Fate, Ray, Shape, Sphere, Topic, Value};
@@ -62,7 +63,8 @@ macro_rules! shapes {
             /// let ball = Shape::from(Sphere::new(DVec3::ZERO, 1.0)?);
             /// let explanation = ball.explain(&Ray::new(DVec3::new(0.0, 0.0, 0.5), DVec3::Z));
             /// let equation = explanation.steps.iter().find(|step| step.topic == Topic::Quadratic).expect("told");
-            /// assert_eq!((equation.quantities[2].symbol.as_ref(), &equation.quantities[2].value), ("c", &Value::Number(-0.75)));
+            /// let c = &equation.quantities[2];
+            /// assert_eq!((c.symbol.as_ref(), &c.value), ("c", &Value::Number(-0.75)));
             /// let fates: Vec<(f64, Fate)> = explanation.candidates.iter().map(|one| (one.t, one.fate)).collect();
             /// assert_eq!(fates, [(-1.5, Fate::Behind), (0.5, Fate::Hit)]);
             /// # Ok::<(), lumbre_geometry::ShapeError>(())
@@ -83,7 +85,8 @@ macro_rules! shapes {
                 match self { $(Self::$shape(shape) => shape.surface_at(part, uv),)+ }
             }
 
-            /// The tightest box around the shape under `world_from_object`, rounded outward; `None` for infinite shapes.
+            /// The tightest box around the shape under `world_from_object`, rounded outward; `None` for infinite
+            /// shapes.
             pub fn bounds(&self, world_from_object: &Transform) -> Option<Aabb> {
                 match self { $(Self::$shape(shape) => shape.bounds(world_from_object),)+ }
             }

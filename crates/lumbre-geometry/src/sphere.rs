@@ -422,7 +422,8 @@ pub(crate) struct Equation {
     pub(crate) nearest: DVec3,
     /// The square of the radius less that of the distance there.
     pub(crate) depth: f64,
-    /// Whether these numbers decide that the line crosses the sphere, leave the roots their digits, and decide that it misses.
+    /// Whether these numbers decide that the line crosses the sphere, leave the roots their digits, and decide that it
+    /// misses.
     pub(crate) is_steep: bool,
     pub(crate) keeps_digits: bool,
     pub(crate) surely_misses: bool,
@@ -440,7 +441,7 @@ impl Equation {
         // All false for a NaN.
         let is_steep =
             depth > 0.1 * square || (far < 2.0 * square && depth * depth > 1e-28 * square * square);
-        // Next to the surface the nearer crossing would lose digits, of which one that starts there has none.
+        // Next to the surface the nearer crossing would lose digits, and a ray that starts there would have none left.
         let keeps_digits = power.abs() > 0.2 * square || power.abs() < 1e-6 * square;
         let surely_misses = depth < -0.1 * square && depth < -1e-27 * far;
         Self { a, h, c: power, nearest, depth, is_steep, keeps_digits, surely_misses }

@@ -8,7 +8,7 @@ use crate::shape::check;
 /// What control points mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum CurveBasis {
-    /// Bézier segments, each of which begins at the last point of the one before.
+    /// Bézier segments; each begins at the last point of the previous one.
     #[default]
     Bezier,
     /// A uniform B-spline, which does not reach its first and last points.
@@ -27,13 +27,15 @@ pub struct Strand {
 }
 
 impl Strand {
-    /// A curve by control points of a basis and a degree, 2 or 3. Its width goes linearly from the first segment's start to the last one's end.
+    /// A curve by control points of a basis and a degree, 2 or 3. Its width goes linearly from the first segment's
+    /// start to the last one's end.
     ///
-    /// Bézier segments of degree d are of d n + 1 points; a B-spline of m points has m - d segments. Quadratic segments are made cubic,
-    /// which changes nothing about them.
+    /// Bézier segments of degree d are of d n + 1 points; a B-spline of m points has m - d segments. Quadratic segments
+    /// are made cubic, which changes nothing about them.
     ///
     /// # Errors
-    /// [`ShapeError`] for another degree, another number of points, points that are not finite, and widths that are not greater than 0.
+    /// [`ShapeError`] for another degree, another number of points, points that are not finite, and widths that are not
+    /// greater than 0.
     pub fn new(
         basis: CurveBasis,
         degree: u32,
@@ -93,7 +95,8 @@ impl Strand {
     /// A smooth curve through two points or more, each with its width: a Catmull–Rom spline. Its ends are straight.
     ///
     /// # Errors
-    /// [`ShapeError`] for fewer points, another number of widths, points that are not finite, and widths that are not greater than 0.
+    /// [`ShapeError`] for fewer points, another number of widths, points that are not finite, and widths that are not
+    /// greater than 0.
     pub fn through(points: &[DVec3], widths: &[f64]) -> Result<Self, ShapeError> {
         if points.len() < 2 {
             return Err(ShapeError::Degenerate("a curve goes through two points or more"));

@@ -70,8 +70,8 @@ pub(crate) fn unit(v: DVec3) -> Option<DVec3> {
     })
 }
 
-/// The unit normal where a ray enters a solid, or leaves it: mirrored where rounding has put it on the wrong side of a ray
-/// that almost touches.
+/// The unit normal where a ray enters a solid, or leaves it: mirrored where rounding has put it on the wrong side of a
+/// ray that almost touches.
 pub(crate) fn on_side_of(normal: DVec3, direction: DVec3, enters: bool) -> DVec3 {
     let along = normal.dot(direction);
     if (enters && along < 0.0) || (!enters && along > 0.0) {

@@ -105,8 +105,8 @@ impl WatertightRay {
         Self { origin, order, shear: DVec3::new(along.x / along.z, along.y / along.z, 1.0 / along.z) }
     }
 
-    /// A point in the sheared space of the ray, whose last axis is the ray: rounded from the ray and the point alone, so
-    /// that it is the same for all faces that share it.
+    /// A point in the sheared space of the ray, whose last axis is the ray: rounded from the ray and the point alone,
+    /// so that it is the same for all faces that share it.
     #[inline]
     pub(crate) fn sheared(&self, p: DVec3) -> DVec3 {
         let along = self.order.apply(p - self.origin);
@@ -220,8 +220,8 @@ impl Edges {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Side {
     /// Whether the edge function is positive. Where it is zero, the ray counts as moved by (ε, ε²) in the sheared plane
-    /// ("simulation of simplicity": H. Edelsbrunner, E. Mücke, ACM Transactions on Graphics 9(1), 1990), as it does among the
-    /// triangles of a mesh, so that the faces on both sides of an edge agree whichever way they run along it.
+    /// ("simulation of simplicity": H. Edelsbrunner, E. Mücke, ACM Transactions on Graphics 9(1), 1990), as it does
+    /// among the triangles of a mesh, so that the faces on both sides of an edge agree whichever way they run along it.
     pub(crate) is_positive: bool,
     /// Whether the ray meets the edge's line exactly.
     pub(crate) is_exact: bool,

@@ -4,15 +4,17 @@ use lumbre_math::DVec3;
 
 use crate::TriangleHit;
 
-/// The intersection of a line with a triangle: first with its plane, then whether the point lies on the inner side of each edge.
+/// The intersection of a line with a triangle: first with its plane, then whether the point lies on the inner side of
+/// each edge.
 ///
-/// The plane through `p0` with the normal `n = (p1 - p0) × (p2 - p0)` is met at `t = (p0 - O)·n / D·n`; and the point `P` is inside
-/// when `((p1 - p0) × (P - p0))·n ≥ 0`, and so for the other two edges in turn. These three numbers over `n·n` are the barycentric
-/// coordinates. Edges belong to the triangle. A. Glassner (ed.), "An Introduction to Ray Tracing", 1989, chapter 2.
+/// The plane through `p0` with the normal `n = (p1 - p0) × (p2 - p0)` is met at `t = (p0 - O)·n / D·n`; and the point
+/// `P` is inside when `((p1 - p0) × (P - p0))·n ≥ 0`, and so for the other two edges in turn. These three numbers over
+/// `n·n` are the barycentric coordinates. Edges belong to the triangle. A. Glassner (ed.), "An Introduction to Ray
+/// Tracing", 1989, chapter 2.
 ///
-/// It is the plainest test and not the best: `P` is rounded before the edges are asked, so that two triangles may both miss a ray at
-/// the edge between them ([`WatertightRay`](crate::WatertightRay) does not), and a division is made for every ray that meets the
-/// plane ([`moller_trumbore`](crate::moller_trumbore) needs less).
+/// It is the plainest test and not the best: `P` is rounded before the edges are asked, so that two triangles may both
+/// miss a ray at the edge between them ([`WatertightRay`](crate::WatertightRay) does not), and a division is made for
+/// every ray that meets the plane ([`moller_trumbore`](crate::moller_trumbore) needs less).
 pub fn plane_and_sides(
     origin: DVec3,
     direction: DVec3,

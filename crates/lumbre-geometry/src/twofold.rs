@@ -38,8 +38,8 @@ pub(crate) fn components<N: Number>(v: DVec3) -> [N; 3] {
     v.to_array().map(N::from)
 }
 
-/// The sum of the absolute values of the terms that a number is computed from: its rounding error is some units of the unit
-/// roundoff of it.
+/// The sum of the absolute values of the terms that a number is computed from: its rounding error is some units of the
+/// unit roundoff of it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Magnitude(pub(crate) f64);
 
@@ -85,7 +85,7 @@ impl Mul for Magnitude {
     }
 }
 
-/// A number of about 32 digits: the sum of two doubles, of which the first is the number rounded.
+/// A number of about 32 digits: the sum of two doubles; the first is the rounded number.
 ///
 /// T. J. Dekker, "A floating-point technique for extending the available precision", Numerische Mathematik, 1971.
 #[derive(Clone, Copy, Debug)]
@@ -112,7 +112,7 @@ impl Twofold {
         Self { high, low }
     }
 
-    /// A sum whose second number is small beside the first.
+    /// A sum whose second number is small compared with the first.
     #[inline]
     fn normalized(high: f64, low: f64) -> Self {
         let sum = high + low;
@@ -223,8 +223,8 @@ fn exact_point(origin: DVec3, base: DVec3, t: f64, direction: DVec3, rough: DVec
     if exact.is_finite() { exact } else { rough }
 }
 
-/// A parameter next to `t`, the point `origin - base + t direction` there, and a bound on that point's error in units of the
-/// unit roundoff: what is lost on a long way is 2^-26 of what doubles lose.
+/// A parameter next to `t`, the point `origin - base + t direction` there, and a bound on that point's error in units
+/// of the unit roundoff: what is lost on a long way is 2^-26 of what doubles lose.
 #[inline]
 pub(crate) fn place_near(origin: DVec3, base: DVec3, t: f64, direction: DVec3) -> (f64, DVec3, DVec3) {
     // Halves of the digits, whose products are exact.

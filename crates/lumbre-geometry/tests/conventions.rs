@@ -1,5 +1,5 @@
-//! What a scene file relies on: how shapes are parametrised, what constructors refuse, and that no size is too large or too
-//! small.
+//! What a scene file relies on: how shapes are parametrised, what constructors refuse, and that no size is too large or
+//! too small.
 
 use lumbre_geometry::{
     BilinearPatch, Cone, Cuboid, Cylinder, Disk, Plane, Ray, Roots, Shape, ShapeError, Sphere, Triangle,

@@ -161,7 +161,8 @@ fn compare(seed: u64, center: DVec3, size: f64, trees: usize, depth: usize, slac
                     continue;
                 }
                 let p = ray.at(t);
-                // Near a surface that touching or rounding makes uncertain, membership must not depend on the last bits.
+                // Near a surface that touching or rounding makes uncertain, membership must not depend on the last
+                // bits.
                 let wobble = slack * DVec3::new(0.48, -0.6, 0.64);
                 let holds = tree.holds(p);
                 if tree.holds(p + wobble) != holds || tree.holds(p - wobble) != holds {
@@ -336,7 +337,7 @@ fn a_ray_may_begin_inside() {
     assert!((inner.normal + DVec3::X).length() < 1e-15, "the shell's inner side faces its hollow");
 }
 
-/// The union of two overlapping boxes, told as a mesh would: each face crossed is reported.
+/// The union of two overlapping boxes, as a mesh would report it: each crossed face.
 #[derive(Debug)]
 struct Overlapping(Cuboid, Cuboid);
 

@@ -1,4 +1,4 @@
-//! Curves beside a search of small steps along them, and how little it matters how they are cut.
+//! Curves against a search in small steps along them, and how little it matters how they are cut.
 
 use std::f64::consts::PI;
 
@@ -61,7 +61,8 @@ fn all_roots(curves: &Curves, ray: &Ray) -> Vec<(u32, Root)> {
     found
 }
 
-/// Places where a strand is nearest to the ray's line, within half of its width: t, and the distance over half the width.
+/// Places where a strand is nearest to the ray's line, within half of its width: t, and the distance over half the
+/// width.
 fn by_steps(curves: &Curves, ray: &Ray, steps: usize) -> Vec<(f64, f64)> {
     let z = ray.direction.normalize();
     let segments = curves.primitive_count();
@@ -94,7 +95,7 @@ fn crossings_are_where_small_steps_along_the_curve_find_them() {
         for _ in 0..40 {
             let ray = ray_near(&mut random, &strand);
             let expected = by_steps(&curves, &ray, 4000);
-            // Too near to an end or to the rim for steps to tell.
+            // Too near to an end or to the rim for steps to decide.
             let is_clear = expected.iter().all(|&(_, share)| (share - 1.0).abs() > 0.02);
             let found = all_roots(&curves, &ray);
             let ends = |&(primitive, root): &(u32, Root)| {

@@ -1,5 +1,6 @@
-//! Crossings of surfaces of the second degree against exact arithmetic: none is lost, none invented, each within 8 units in
-//! the last place unless it grazes, from far away, on slender shapes, and along tangents, apexes, axes and generators.
+//! Crossings of surfaces of the second degree against exact arithmetic: none is lost, none invented, each within 8
+//! units in the last place unless it grazes, from far away, on slender shapes, and along tangents, apexes, axes and
+//! generators.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 

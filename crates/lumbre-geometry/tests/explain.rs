@@ -1,5 +1,5 @@
-//! What an explanation promises: its hits are those of the search, to the bit; what it says of the other crossings is true; and its
-//! coefficients vanish at its roots.
+//! What an explanation promises: its hits are those of the search, to the bit; what it says of the other crossings is
+//! true; and its coefficients vanish at its roots.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -286,7 +286,7 @@ fn the_coefficients_vanish_at_the_roots_in_exact_arithmetic() {
     assert!(vanished > 600 && nearby > 100 && twofold > 10, "{vanished} {nearby} {twofold}");
 }
 
-/// Puts the roots into the equation that is told; returns how many there are.
+/// Puts the roots into the equation of the explanation; returns how many there are.
 fn check_equation(
     steps: &[Step],
     ray: &Ray,
@@ -616,7 +616,8 @@ fn whole_shapes() -> Vec<Whole> {
     all
 }
 
-/// What the remarks and fates of an explanation claim of a ray of whole numbers, held to exact arithmetic; counts them by name.
+/// What the remarks and fates of an explanation claim of a ray of whole numbers, held to exact arithmetic; counts them
+/// by name.
 fn hold_claims(whole: &Whole, ray: &Ray, said: &mut BTreeMap<&'static str, usize>) {
     let shape = &whole.subject.shape;
     let explanation = shape.explain(ray);

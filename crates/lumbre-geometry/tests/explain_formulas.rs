@@ -1,4 +1,4 @@
-//! The formulas of an explanation are in its grammar, and give the numbers that stand beside them.
+//! The formulas of an explanation are in its grammar, and give the numbers next to them.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 

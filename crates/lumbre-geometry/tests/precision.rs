@@ -43,8 +43,9 @@ fn square(x: Double) -> Double {
     x.mul(x)
 }
 
-/// Shoots rays at a shape from 10^0 to 10^8 away, and returns the largest error of `t` in units of its last place, times
-/// the cosine of the angle with the normal, by which the problem itself magnifies every error; and the number of crossings.
+/// Shoots rays at a shape from 10^0 to 10^8 away, and returns the largest error of `t` in units of its last place,
+/// times the cosine of the angle with the normal, by which the problem itself magnifies every error; and the number of
+/// crossings.
 ///
 /// `residual(ray, t)` is the implicit function over its derivative in t: the step that Newton's method would take.
 fn worst_ulps(shape: impl Into<Shape>, center: DVec3, residual: impl Fn(&Ray, f64) -> f64) -> (f64, usize) {

@@ -1,5 +1,5 @@
-//! Sampling by solid angle against the closed form of ∫ω dω over what is seen, the vector that Lambert's polygon formula
-//! gives: an error in the map that random samples would drown shows here.
+//! Sampling by solid angle against the closed form of ∫ω dω over what is seen, the vector that Lambert's polygon
+//! formula gives: an error in the map that random samples would drown shows here.
 
 use lumbre_geometry::{BilinearPatch, Shape, Sphere, Triangle};
 use lumbre_math::random::RandomStream;

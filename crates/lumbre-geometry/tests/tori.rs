@@ -126,8 +126,8 @@ fn in_ball(random: &mut RandomStream) -> DVec3 {
     }
 }
 
-/// Aims rays at tori from `distance` radii away, and returns the worst error of t, as a distance in units of the torus's
-/// size, times the cosine of incidence; with how many crossings were compared.
+/// Aims rays at tori from `distance` radii away, and returns the worst error of t, as a distance in units of the
+/// torus's size, times the cosine of incidence; with how many crossings were compared.
 fn worst_error(distance: f64, spindle: bool, seed: u64, rays: usize) -> (f64, usize) {
     let mut random = RandomStream::new(seed);
     let (mut worst, mut compared) = (0.0_f64, 0);

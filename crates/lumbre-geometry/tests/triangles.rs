@@ -16,7 +16,8 @@ impl Random {
     }
 }
 
-/// A closed sphere of triangles about (3, -2, 5), its poles and all; the vertices are rounded to single precision if asked.
+/// A closed sphere of triangles about (3, -2, 5), its poles and all; the vertices are rounded to single precision if
+/// asked.
 fn ball(single: bool) -> Vec<[DVec3; 3]> {
     let (rows, columns) = (7_u32, 11_u32);
     let vertex = |row: u32, column: u32| {

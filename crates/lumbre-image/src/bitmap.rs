@@ -221,8 +221,8 @@ impl Bitmap {
         }
     }
 
-    /// The picture on a larger or smaller canvas, its upper left corner at (x, y) there. Elsewhere the canvas is black, and
-    /// transparent if the picture has alpha.
+    /// The picture on a larger or smaller canvas, its upper left corner at (x, y) there. Elsewhere the canvas is black,
+    /// and transparent if the picture has alpha.
     ///
     /// # Panics
     /// When the canvas has no pixels.
@@ -261,8 +261,8 @@ impl Bitmap {
         canvas
     }
 
-    /// Makes texels black that have a channel that is infinite or no number. How many there were, and the place of the first,
-    /// from the top left.
+    /// Makes texels black that have a channel that is infinite or no number. How many there were, and the place of the
+    /// first, from the top left.
     pub fn blacken_not_finite(&mut self) -> (usize, (u32, u32)) {
         let (channels, width) = (self.channels.count(), self.width as usize);
         let (mut count, mut first) = (0, (0, 0));

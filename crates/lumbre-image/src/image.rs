@@ -29,7 +29,7 @@ impl Image {
         })
     }
 
-    /// The image with alpha in `[0, 1]`, one value a pixel; `None` unless there are as many as pixels.
+    /// The image with alpha in `[0, 1]`, one value a pixel; `None` unless there is one per pixel.
     pub fn with_alpha(self, alpha: Vec<f32>) -> Option<Self> {
         (alpha.len() == self.pixels.len()).then_some(Self { alpha: Some(alpha), ..self })
     }

@@ -1,11 +1,11 @@
-//! How many rays a second: `cargo run --release -p lumbre-kernel --example kernel_speed [-- [--quick] [NAME]]`, where NAME is a
-//! part of a scene's name.
+//! How many rays a second: `cargo run --release -p lumbre-kernel --example kernel_speed [-- [--quick] [NAME]]`, where
+//! NAME is a part of a scene's name.
 //!
-//! Scenes: a room, alone and with a sphere and an instance in it, bumpy spheres of triangles, a field of spheres, the field of mixed
-//! shapes on a plane, and an instanced field. Rays: primary (of a pinhole camera, in squares of four by four pixels), bounce (from the
-//! primary hits, at random), shadow (from the primary hits to a light). Each figure is the best of several passes, in millions of
-//! rays a second: of single rays by one thread and by two; in batches; as rays of a picture, 4096 at a time; and these by
-//! double precision.
+//! Scenes: a room, alone and with a sphere and an instance in it, bumpy spheres of triangles, a field of spheres, the
+//! field of mixed shapes on a plane, and an instanced field. Rays: primary (of a pinhole camera, in squares of four by
+//! four pixels), bounce (from the primary hits, at random), shadow (from the primary hits to a light). Each figure is
+//! the best of several passes, in millions of rays a second: of single rays by one thread and by two; in batches; as
+//! rays of a picture, 4096 at a time; and these by double precision.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -152,7 +152,8 @@ fn speed(rays: &[Ray], threads: usize, passes: usize, query: impl Fn(&Ray) + Syn
     rays.len() as f64 / best / 1e6
 }
 
-/// Millions of rays a second in batches, as rays of a picture, and as those in double precision; closest hits, then any.
+/// Millions of rays a second in batches, as rays of a picture, and as those in double precision; closest hits, then
+/// any.
 fn speeds_of_many(accel: &Accel, rays: &[Ray], passes: usize) -> [f64; 6] {
     const WAVE: usize = 4096;
     let origin = [0, 1, 2].map(|axis| rays.iter().map(|ray| ray.origin[axis]).collect::<Vec<_>>());

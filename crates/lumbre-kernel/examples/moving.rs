@@ -1,8 +1,8 @@
 //! What it costs when things move: `cargo run --release -p lumbre-kernel --example moving [-- THREADS]`.
 //!
-//! Sixty-four balls, 1.2 million triangles, change places at random, time and again. Each time the tree is refitted, then rebuilt
-//! in part, and another is built of the same geometries. Times in milliseconds, and what a ray from among the balls takes in
-//! each tree, in nanoseconds: the best of several passes.
+//! Sixty-four balls, 1.2 million triangles, change places at random, time and again. Each time the tree is refitted,
+//! then rebuilt in part, and another is built of the same geometries. Times in milliseconds, and what a ray from among
+//! the balls takes in each tree, in nanoseconds: the best of several passes.
 
 use std::f64::consts::{PI, TAU};
 use std::hint::black_box;
@@ -114,7 +114,7 @@ fn ball() -> TriangleMesh {
     TriangleMesh { origin: DVec3::ZERO, positions, indices }
 }
 
-/// The balls, each at one of as many places. Their vertices move, not their meshes' origins, as those of what deforms do.
+/// The balls, each in a place of its own. Their vertices move, not their meshes' origins, as those of what deforms do.
 fn crowd(ball: &TriangleMesh, places: &[usize]) -> Vec<Geometry> {
     let at = |(id, &place): (usize, &usize)| {
         let center = [place % SIDE, place / SIDE % SIDE, place / (SIDE * SIDE)].map(|x| x as f32);

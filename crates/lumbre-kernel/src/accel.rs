@@ -66,7 +66,7 @@ impl Accel {
         input::build(geometries, options).map(Self::over)
     }
 
-    /// Moves the contents of the tree: `geometries` are those that it was built from, with other vertices, shapes,
+    /// Moves the contents of the tree: `geometries` are the ones that it was built from, with other vertices, shapes,
     /// transforms or trees of instances. The tree keeps its structure and gets new boxes. Queries answer as after a
     /// build.
     ///
@@ -80,8 +80,8 @@ impl Accel {
     /// as a whole, until a tree comes that has these nodes.
     ///
     /// If an instance or a clone shares the tree, a copy is refitted, and they keep the old one. So refit trees from
-    /// the inside out: after a tree, refit those that contain it, with its new [`Accel::instance`]. To save the copy,
-    /// drop the others first.
+    /// the inside out: after a tree, refit the trees that contain it, with its new [`Accel::instance`]. To save the
+    /// copy, drop the others first.
     ///
     /// # Errors
     /// [`RefitError`] if the geometries are invalid, or not of the same kinds and sizes, or something that was left out
@@ -172,8 +172,8 @@ impl Accel {
         mapped::map(path.as_ref(), geometries).map(Self::over)
     }
 
-    /// The closest hit in the ray's range. Of hits at the same `t`, the one whose (path, geometry, primitive) comes
-    /// first, by positions in the lists that the trees were built from.
+    /// The closest hit in the ray's range. Of hits at the same `t`, one that enters comes before one that leaves, then
+    /// the one whose (path, geometry, primitive) comes first, by positions in the lists that the trees were built from.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.queries.closest.ask(&self.tree, ray)
@@ -351,9 +351,9 @@ impl Accel {
     /// at least 4/√3 Σ |nᵢ| eᵢ as |n|₁ ≤ √3: 3.3 Σ |nᵢ| eᵢ in total. So e = 2u |p - origin| + 20u covers it, and the
     /// distance of o from p. Code that moves points by less needs a larger error.
     ///
-    /// Under the map L of an instance, the error is |L| e, and the unit normal m = L⁻ᵀn / |L⁻ᵀn|. A move by d along m is one by
-    /// d |L⁻ᵀn| across the plane of the triangle in its own space, and Σ |mᵢ| (|L| e)ᵢ ≥ Σ |nᵢ| eᵢ / |L⁻ᵀn|: there, too, it is moved by
-    /// 3.3 Σ |nᵢ| eᵢ or more.
+    /// Under the map L of an instance, the error is |L| e, and the unit normal m = L⁻ᵀn / |L⁻ᵀn|. A move by d along m
+    /// is one by d |L⁻ᵀn| across the plane of the triangle in its own space, and Σ |mᵢ| (|L| e)ᵢ ≥ Σ |nᵢ| eᵢ / |L⁻ᵀn|:
+    /// there, too, it is moved by 3.3 Σ |nᵢ| eᵢ or more.
     pub fn picture_rounding(&self) -> Option<PictureRounding> {
         self.tree.picture_start().map(|picture| picture.rounding)
     }
@@ -394,7 +394,7 @@ impl Accel {
     /// set. They are saved with the tree, and stay through a refit.
     ///
     /// # Panics
-    /// If there are not as many masks as geometries.
+    /// If the numbers of masks and geometries differ.
     #[must_use]
     pub fn with_masks(mut self, masks: Vec<u32>) -> Self {
         assert_eq!(masks.len(), self.tree.geometries.len(), "a mask for each geometry");
@@ -515,7 +515,7 @@ impl Accel {
         surface::target(&self.tree, ray, hit)
     }
 
-    /// Visits every primitive, including those that no ray meets, as a hit without a crossing (its `t` is NaN), until
+    /// Visits every primitive, including ones that no ray can hit, as a hit without a crossing (its `t` is NaN), until
     /// `visit` breaks. The primitives of an instance are visited once for each instance. [`Accel::target`] says what
     /// each is, and where it is.
     pub fn each_primitive(&self, mut visit: impl FnMut(&Hit) -> ControlFlow<()>) {

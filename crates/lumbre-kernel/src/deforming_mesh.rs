@@ -17,7 +17,7 @@ use crate::tree::geometry::{CustomGeometry, TriangleMesh};
 /// it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeformingMesh {
-    // At least one moment; each has as many finite positions as the triangles need; the start is before the end.
+    // At least one moment; each has the finite positions that the triangles need; the start is before the end.
     origin: DVec3,
     start: f64,
     end: f64,

@@ -1,4 +1,4 @@
-//! Enumerates every primitive of a tree, including those that no ray meets.
+//! Enumerates every primitive of a tree, including ones that no ray can hit.
 
 use std::ops::ControlFlow;
 

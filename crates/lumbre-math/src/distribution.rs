@@ -98,8 +98,8 @@ impl PiecewiseConstant1D {
         (largest > 0.0).then(|| Self { mean: sum / weights.len() as f64 * largest, starts })
     }
 
-    /// For each cell the probability of all before it, out of [`PiecewiseConstant1D::TOTAL`]: ascending, from 0. A cell of weight zero
-    /// begins where the next one does.
+    /// For each cell the probability of all before it, out of [`PiecewiseConstant1D::TOTAL`]: ascending, from 0. A cell
+    /// of weight zero begins where the next one does.
     pub fn starts(&self) -> &[u32] {
         &self.starts
     }
@@ -200,7 +200,8 @@ impl PiecewiseConstant2D {
         &self.marginal
     }
 
-    /// The [`PiecewiseConstant1D::starts`] of the columns of each row, one row after the other; all zero for a row of weight zero.
+    /// The [`PiecewiseConstant1D::starts`] of the columns of each row, one row after the other; all zero for a row of
+    /// weight zero.
     pub fn row_starts(&self) -> &[u32] {
         &self.rows
     }

@@ -4,9 +4,10 @@ use glam::DVec2;
 
 /// Sines, exponentials and their like, computed by the same operations everywhere; and what only some libraries round correctly.
 ///
-/// The methods of the standard library with the shorter names call the system's own, whose last digits differ from one library to the
-/// next, and with the instruction set of the processor. Pictures are to have the same bytes on every machine, so nothing that
-/// reaches a pixel calls those. Errors are below one unit in the last place for most arguments, and nowhere above two.
+/// The methods of the standard library with the shorter names call the system's own, whose last digits differ from one
+/// library to the next, and with the instruction set of the processor. Pictures are to have the same bytes on every
+/// machine, so nothing that reaches a pixel calls those. Errors are below one unit in the last place for most
+/// arguments, and nowhere above two.
 pub trait Elementary: Copy {
     /// The sine of an angle in radians.
     fn sine(self) -> Self;
@@ -97,7 +98,8 @@ mod tests {
     use super::Elementary;
     use crate::random::RandomStream;
 
-    /// What the functions of arguments all over their ranges are, as one hash: another system, processor or compiler gives the same.
+    /// What the functions of arguments all over their ranges are, as one hash: another system, processor or compiler
+    /// gives the same.
     #[test]
     fn the_bits_are_those_of_every_machine() {
         let mut random = RandomStream::new(11);

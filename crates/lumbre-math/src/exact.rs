@@ -1,7 +1,8 @@
-//! Determinants, inverses and linear equations in exact arithmetic: a matrix is singular where its determinant is 0, and nowhere else.
+//! Determinants, inverses and linear equations in exact arithmetic: a matrix is singular where its determinant is 0,
+//! and nowhere else.
 //!
-//! Every double is a whole number times a power of two, and so are their sums and products. Such numbers are kept here in full;
-//! only a result is rounded. That costs microseconds, which is fine for a single matrix: what renders uses
+//! Every double is a whole number times a power of two, and so are their sums and products. Such numbers are kept here
+//! in full; only a result is rounded. That costs microseconds, which is fine for a single matrix: what renders uses
 //! [`Transform`](crate::Transform).
 
 /// A whole number times a power of two.
@@ -206,7 +207,8 @@ fn cofactor(m: &Rows, row: usize, column: usize) -> Exact {
 }
 
 /// The determinant of a matrix given by its rows: exact, rounded once. It is 0 only if the matrix is singular, or if
-/// the determinant is less than the least double. NaN where an entry is not finite, infinite where it is beyond all doubles.
+/// the determinant is less than the least double. NaN where an entry is not finite, infinite where it is beyond all
+/// doubles.
 pub fn determinant<const N: usize>(rows: &[[f64; N]; N]) -> f64 {
     exact_rows(rows).map_or(f64::NAN, |m| expanded(&m).rounded())
 }

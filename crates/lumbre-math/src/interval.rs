@@ -1,8 +1,8 @@
 //! Interval arithmetic, and numbers that carry their derivative in it.
 //!
-//! Every operation contains all results that it can have for numbers in its operands, rounding included. Source: R. E. Moore,
-//! R. B. Kearfott, M. J. Cloud, "Introduction to Interval Analysis", SIAM, 2009; the derivatives after L. B. Rall, "Automatic
-//! Differentiation: Techniques and Applications", Springer, 1981.
+//! Every operation contains all results that it can have for numbers in its operands, rounding included. Source: R. E.
+//! Moore, R. B. Kearfott, M. J. Cloud, "Introduction to Interval Analysis", SIAM, 2009; the derivatives after L. B.
+//! Rall, "Automatic Differentiation: Techniques and Applications", Springer, 1981.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -50,8 +50,8 @@ impl Interval {
         (both.low <= both.high).then_some(both)
     }
 
-    /// Bounds of results that were rounded, wrong by no more than `steps` representable numbers. Where a bound is no number, as
-    /// for infinity times zero, nothing is known.
+    /// Bounds of results that were rounded, wrong by no more than `steps` representable numbers. Where a bound is no
+    /// number, as for infinity times zero, nothing is known.
     fn outward(low: f64, high: f64, steps: u32) -> Self {
         if low.is_nan() || high.is_nan() {
             return Self::WHOLE;
@@ -109,12 +109,13 @@ impl Interval {
     #[must_use]
     pub fn cos(self) -> Self {
         let Self { low, high } = self;
-        // Where the turns are too many to be told apart, all of them.
+        // If the turns are too many to be distinguished, all of them.
         let reach = low.abs().max(high.abs());
         if (high - low).is_nan() || high - low >= TAU || reach >= 1e12 {
             return Self { low: -1.0, high: 1.0 };
         }
-        // Whether it contains a multiple of a turn, from some offset. The error of a quotient is below 2⁻¹⁰ of a turn at the bound.
+        // Whether it contains a multiple of a turn, from some offset. The error of a quotient is below 2⁻¹⁰ of a turn
+        // at the bound.
         let passes = |offset: f64| {
             let error = 4.0 * f64::EPSILON * (1.0 + reach);
             ((high + error) / TAU - offset).floor() >= ((low - error) / TAU - offset).ceil()
@@ -190,7 +191,8 @@ impl Div for Interval {
     }
 }
 
-/// The value of a function and its derivative, both as intervals: over all of the arguments that the function was given.
+/// The value of a function and its derivative, both as intervals: over all of the arguments that the function was
+/// given.
 ///
 /// A function that is written with these instead of numbers gives its derivative with its value:
 ///

@@ -6,14 +6,14 @@
 //! Vectors are columns and a matrix acts from the left, `p' = M p`, so that a product reads right to left: `T * R`
 //! rotates first. Points carry w = 1, directions w = 0. Angles in the interfaces are in degrees, unless a name says
 //! otherwise, and exact at the right angles; a positive rotation about z turns x towards y, about x y towards z, about
-//! y z towards x, whatever the hand in which the axes are drawn. The parameter `t` of a ray is in units of its direction
-//! as given. Row vectors and other hands enter at the boundary: see [`matrix`].
+//! y z towards x, whatever the hand in which the axes are drawn. The parameter `t` of a ray is in units of its
+//! direction as given. Row vectors and other hands enter at the boundary: see [`matrix`].
 //!
 //! # glam in the public interface
 //!
-//! Vectors, matrices and quaternions are those of glam 0.34, which is re-exported as [`glam`] so that a program need not name
-//! the version: `use lumbre_math::glam`. A change to another minor version of glam (0.35) is a breaking change of this crate
-//! and of all that build on it, and raises their minor versions too; a patch of glam is not.
+//! Vectors, matrices and quaternions are those of glam 0.34, which is re-exported as [`glam`] so that a program need
+//! not name the version: `use lumbre_math::glam`. A change to another minor version of glam (0.35) is a breaking change
+//! of this crate and of all that build on it, and raises their minor versions too; a patch of glam is not.
 //!
 //! Nothing here does input or output or keeps a state, and nothing panics on any number.
 //!

@@ -1,8 +1,8 @@
 //! Gradient noise, and sums of its octaves.
 //!
-//! K. Perlin, "Improving Noise", SIGGRAPH 2002; octaves after D. Ebert and others, "Texturing and Modeling: A Procedural Approach",
-//! 3rd edition, 2003. The permutation is the one that Perlin published, and gradients are chosen as pbrt does, so that patterns of
-//! its scenes stand where they stand there.
+//! K. Perlin, "Improving Noise", SIGGRAPH 2002; octaves after D. Ebert and others, "Texturing and Modeling: A
+//! Procedural Approach", 3rd edition, 2003. The permutation is the one that Perlin published, and gradients are chosen
+//! as pbrt does, so that patterns of its scenes stand where they stand there.
 
 use glam::DVec3;
 
@@ -60,7 +60,8 @@ pub fn noise(p: DVec3) -> f64 {
     lerp(wz, along_y(0), along_y(1))
 }
 
-/// From one octave of a sum to the next, how much finer it is. Not 2, so that points where noise is 0 do not fall together.
+/// From one octave of a sum to the next, how much finer it is. Not 2, so that points where noise is 0 do not fall
+/// together.
 const LACUNARITY: f64 = 1.99;
 
 /// Octaves of noise to be summed.
@@ -73,8 +74,8 @@ pub struct Octaves {
 }
 
 impl Octaves {
-    /// The sum of octaves of noise, fractional Brownian motion. `footprint` are the sides of what is looked at; octaves finer than it are
-    /// left out, the last one by degrees. A footprint of zero has all of them.
+    /// The sum of octaves of noise, fractional Brownian motion. `footprint` are the sides of what is looked at; octaves
+    /// finer than it are left out, the last one by degrees. A footprint of zero has all of them.
     pub fn fbm(self, p: DVec3, footprint: [DVec3; 2]) -> f64 {
         let (whole, part) = self.seen(footprint);
         let (mut sum, mut scale, mut strength) = (0.0, 1.0, 1.0);
@@ -86,7 +87,8 @@ impl Octaves {
         if part > 0.0 { sum + strength * part * noise(scale * p) } else { sum }
     }
 
-    /// The sum of the absolute values of octaves of noise, turbulence. Octaves that are too fine count by their mean, about 0.2.
+    /// The sum of the absolute values of octaves of noise, turbulence. Octaves that are too fine count by their mean,
+    /// about 0.2.
     pub fn turbulence(self, p: DVec3, footprint: [DVec3; 2]) -> f64 {
         const MEAN: f64 = 0.2;
         let (whole, part) = self.seen(footprint);
@@ -97,8 +99,8 @@ impl Octaves {
             strength *= self.roughness;
         }
         if whole < self.count {
-            // What is seen of the next octave, and its mean for the rest; it stands in the means of all that are left out once more,
-            // as in pbrt, so that pictures agree.
+            // What is seen of the next octave, and its mean for the rest; it stands in the means of all that are left
+            // out once more, as in pbrt, so that pictures agree.
             sum += strength * ((1.0 - part) * MEAN + part * noise(scale * p).abs());
             for _ in whole..self.count {
                 sum += strength * MEAN;

@@ -1,7 +1,7 @@
 //! Projection matrices: orthographic and perspective.
 //!
 //! They act on homogeneous coordinates in the space of a right-handed camera that looks along -z; see
-//! [`project`]. They tell where a point of the scene appears in the picture; rays are made by
+//! [`project`]. They give where a point of the scene appears in the picture; rays are made by
 //! [`View`](crate::view::View).
 
 use glam::{DMat4, DVec3, DVec4};

@@ -71,11 +71,11 @@ pub fn quadratic(a: f64, h: f64, c: f64, delta: f64) -> Option<(f64, f64)> {
     Some(if first <= second { (first, second) } else { (second, first) })
 }
 
-/// The real roots of `a t² + b t + c = 0` in ascending order, a double root twice; none where there is none, or where all of
-/// `t` are. With `a` zero, the root of the linear equation comes alone.
+/// The real roots of `a t² + b t + c = 0` in ascending order, a double root twice; none where there is none, or where
+/// all of `t` are. With `a` zero, the root of the linear equation comes alone.
 ///
-/// The discriminant `b² - 4 a c` is computed to all of its digits ([`dop`]), so that nearly equal roots are told apart and the
-/// number of roots is right.
+/// The discriminant `b² - 4 a c` is computed to all of its digits ([`dop`]), so that nearly equal roots are
+/// distinguished and the number of roots is right.
 pub fn roots_of(a: f64, b: f64, c: f64) -> Vec<f64> {
     if a == 0.0 {
         let root = -c / b;

@@ -1,8 +1,9 @@
 //! Quaternions of any non-zero length as rotations, and Euler angles that are accurate at the poles.
 //!
 //! The type is glam's [`DQuat`], which lists `x, y, z, w`; most texts list the real part first, as
-//! [`from_wxyz`] does. glam has the sum `p + q`, the product `p * q` ("first q") and `q.conjugate()`. Its `inverse`, `q * v` and `from_quat` require unit quaternions; the
-//! functions here do not, and take quaternions of any length: they are scaled by a power of two first, which changes no digit.
+//! [`from_wxyz`] does. glam has the sum `p + q`, the product `p * q` ("first q") and `q.conjugate()`. Its `inverse`,
+//! `q * v` and `from_quat` require unit quaternions; the functions here do not, and take quaternions of any length:
+//! they are scaled by a power of two first, which changes no digit.
 
 use crate::Elementary;
 use glam::{DMat3, DQuat, DVec3};
@@ -48,12 +49,12 @@ fn scaled_to_one(q: DQuat) -> (DQuat, f64) {
     (q * factor, factor)
 }
 
-/// The rotation a share `s` of the way from `p` to `q`, the shorter way about at a steady pace: `(sin((1-s)θ) p + sin(sθ) q) / sin θ`
-/// for unit quaternions with the angle θ between them. It is a unit quaternion; `None` where `p` or `q` is zero or anything is
-/// not finite.
+/// The rotation a share `s` of the way from `p` to `q`, the shorter way about at a steady pace: `(sin((1-s)θ) p +
+/// sin(sθ) q) / sin θ` for unit quaternions with the angle θ between them. It is a unit quaternion; `None` where `p` or
+/// `q` is zero or anything is not finite.
 ///
-/// K. Shoemake, "Animating rotation with quaternion curves", SIGGRAPH, 1985. θ is twice the angle whose tangent is `|p - q| / |p + q|`,
-/// which is accurate for small angles as well.
+/// K. Shoemake, "Animating rotation with quaternion curves", SIGGRAPH, 1985. θ is twice the angle whose tangent is
+/// `|p - q| / |p + q|`, which is accurate for small angles as well.
 pub fn slerp(p: DQuat, q: DQuat, s: f64) -> Option<DQuat> {
     let (p, q) = (unit(p)?, unit(q)?);
     // q and -q are the same rotation.

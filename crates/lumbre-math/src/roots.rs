@@ -157,7 +157,7 @@ pub fn depressed_cubic_roots(a: f64, b: f64) -> RealRoots<3> {
 pub enum DepressedCubic {
     /// The only real root.
     OneRoot(f64),
-    /// Three, two of which may be equal.
+    /// Three; two may be equal.
     ThreeRoots(ThreeRoots),
 }
 

@@ -32,16 +32,17 @@ pub fn next_down_by(x: f64, steps: u32) -> f64 {
     (0..steps).fold(x, |x, _| x.next_down())
 }
 
-/// The origin of a ray that leaves a surface at `point` towards `direction`: offset along the unit normal to the side of `direction`,
-/// beyond any place where the true surface can be, so that the ray does not meet the surface that it leaves.
+/// The origin of a ray that leaves a surface at `point` towards `direction`: offset along the unit normal to the side
+/// of `direction`, beyond any place where the true surface can be, so that the ray does not meet the surface that it
+/// leaves.
 ///
-/// `error` bounds, axis by axis, the distance of `point` from the surface. A `direction` perpendicular to the normal counts as on the
-/// side of the normal.
+/// `error` bounds, axis by axis, the distance of `point` from the surface. A `direction` perpendicular to the normal
+/// counts as on the side of the normal.
 ///
-/// Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 2023, 6.8.6. There, intersection tests reject a `t` within its
-/// own error; here the offset is larger instead, by the error of the coordinate with the largest error, which rounds into `t`.
-/// Otherwise a face in the plane z = 0, whose error along z is 0, would be met again. At the origin, where all errors may be 0, the
-/// offset is so large that no map makes it 0.
+/// Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 2023, 6.8.6. There, intersection tests reject a
+/// `t` within its own error; here the offset is larger instead, by the error of the coordinate with the largest error,
+/// which rounds into `t`. Otherwise a face in the plane z = 0, whose error along z is 0, would be met again. At the
+/// origin, where all errors may be 0, the offset is so large that no map makes it 0.
 #[inline]
 pub fn offset_point(point: DVec3, error: DVec3, normal: DVec3, direction: DVec3) -> DVec3 {
     const LEAST: f64 = 1e-250;

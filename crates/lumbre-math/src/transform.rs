@@ -271,8 +271,8 @@ impl Transform {
     }
 }
 
-/// The three rows of its matrix that say something, each with its translation last: `[[1, 0, 0, 3], [0, 1, 0, 5], [0, 0, 1, 7]]`.
-/// A precision applies to every number.
+/// The three rows of its matrix that say something, each with its translation last: `[[1, 0, 0, 3], [0, 1, 0, 5], [0,
+/// 0, 1, 7]]`. A precision applies to every number.
 impl std::fmt::Display for Transform {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let DAffine3 { matrix3, translation } = self.forward;

@@ -57,8 +57,8 @@ pub fn unit(a: DVec3) -> Option<DVec3> {
     unit.is_finite().then_some(unit)
 }
 
-/// `a` times a power of two that makes its largest component about 1, and that power: no digit changes, and squares and products
-/// neither overflow nor vanish. Zero and what is not finite stay as they are.
+/// `a` times a power of two that makes its largest component about 1, and that power: no digit changes, and squares and
+/// products neither overflow nor vanish. Zero and what is not finite stay as they are.
 pub(crate) fn scaled_to_one(a: DVec3) -> (DVec3, f64) {
     let factor = power_of_two_over(a.abs().max_element());
     (a * factor, factor)

@@ -36,8 +36,8 @@ macro_rules! warps {
 
         use crate::Elementary;
 
-        /// The sine and cosine of an angle up to π/4, by as many terms of their series as the precision shows: the same bits
-        /// on every machine, and faster than what is good for all angles.
+        /// The sine and cosine of an angle up to π/4, by the terms of their series that the precision can hold: the
+        /// same bits on every machine, and faster than what is good for all angles.
         #[inline]
         pub(crate) fn sin_cos_octant(angle: $scalar) -> ($scalar, $scalar) {
             let square = angle * angle;

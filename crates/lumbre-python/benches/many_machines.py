@@ -82,7 +82,7 @@ class Job:
     scene: float = 0.0
     """Bytes of the scene that are sent to each worker."""
     threads: float = 1.0
-    """Threads of each worker, all of which are at one task."""
+    """Threads of each worker, all at one task."""
     fan_in: int = 1
     """How many passes of a tile workers merge before the client does."""
 
@@ -418,7 +418,7 @@ def jobs() -> dict[str, Callable[[int], Job]]:
 
 
 def default(job: Job, slots: int) -> Job:
-    """As `lumbre.distributed` cuts a render where it is not told how."""
+    """As `lumbre.distributed` cuts a render by default."""
     wanted = max(4 * slots, min(32 * slots, 1 << 14), math.ceil(job.pixels * SPP / (1 << 23)))
     side = max(16, math.ceil(math.sqrt(job.pixels / wanted)))
     tiles = math.ceil(SIZE[0] / side) * math.ceil(SIZE[1] / side)

@@ -1,4 +1,4 @@
-"""A render on Dask workers of one thread, and on as many threads of one process, in turns: what machines cost where they are no gain.
+"""A render on Dask workers of one thread, and on the same number of threads of one process, in turns: what machines cost where they are no gain.
 
     python many_machines_here.py [samples a pixel, by default 64] [rounds, by default 3] [workers, by default 2]
 

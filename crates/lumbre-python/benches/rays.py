@@ -67,7 +67,7 @@ def casters(vertices: np.ndarray, faces: np.ndarray) -> dict[str, Caster]:
 
 
 def rays(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rays from all around, in no order, most of which hit."""
+    """Rays from all around, unordered; most hit."""
     random = np.random.default_rng(1)
     origins = random.normal(size=(count, 3))
     origins *= 2.5 / np.linalg.norm(origins, axis=1, keepdims=True)

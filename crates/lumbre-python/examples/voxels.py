@@ -4,7 +4,7 @@ import numpy as np
 
 import lumbre
 
-# A torus as a mesh, of which a patch is missing.
+# A torus as a mesh with a patch missing.
 u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 64, endpoint=False), np.linspace(0, 2 * np.pi, 32, endpoint=False), indexing="ij")
 ring = 1.5 + 0.6 * np.cos(v)
 vertices = np.stack([ring * np.cos(u), ring * np.sin(u), 0.6 * np.sin(v)], axis=-1).reshape(-1, 3)

@@ -203,7 +203,8 @@ fn fill<O: Send>(
     each_piece(py, count, pieces, |(number, piece): (usize, &mut [O])| work(number * size, piece))
 }
 
-/// Every hit of every ray by ascending t: its columns by name, and `offsets`, by which those of ray i are `offsets[i]..offsets[i + 1]`.
+/// Every hit of every ray by ascending t: its columns by name, and `offsets`, by which those of ray i are
+/// `offsets[i]..offsets[i + 1]`.
 pub(crate) fn all<'py, T: Real>(
     py: Python<'py>,
     scene: &Scene,

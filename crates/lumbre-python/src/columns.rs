@@ -18,7 +18,7 @@ const FEW: usize = 256;
 /// What stands for no shape, primitive or instance.
 pub(crate) const NONE: i32 = -1;
 
-/// The arrays to write, each with a row for every ray; those that nobody wants are not there.
+/// The arrays to write, each with a row for every ray; only the requested ones.
 pub(crate) struct Outputs<'py, T: Real> {
     t: Option<PyReadwriteArray1<'py, T>>,
     point: Option<PyReadwriteArray2<'py, T>>,
@@ -283,7 +283,7 @@ impl<'a, T: Real> Columns<'a, T> {
         self.first..self.first + self.count
     }
 
-    /// Whether anything is wanted that only the surface tells.
+    /// Whether anything requested needs the surface.
     pub(crate) fn wants_surface(&self) -> bool {
         self.point.is_some() || self.normal.is_some() || self.uv.is_some() || self.front.is_some()
     }

@@ -27,7 +27,7 @@ pub(crate) fn raised(error: Error) -> PyErr {
     }
 }
 
-/// The exception for why the program would fail: as of [`raised`].
+/// Converts a failure of the program, like [`raised`].
 pub(crate) fn failed(failure: Failure) -> PyErr {
     match failure {
         Failure::Io(message) => PyOSError::new_err(message),
@@ -41,7 +41,7 @@ pub(crate) fn check_environment() -> PyResult<()> {
     lumbre_simd::InstructionSet::from_environment().map(drop).map_err(|wrong| invalid(wrong.to_string()))
 }
 
-/// Numbers as a tuple of Python.
+/// Numbers as a Python tuple.
 pub(crate) fn tuple<T: std::fmt::Display>(numbers: &[T]) -> String {
     let words: Vec<String> = numbers.iter().map(T::to_string).collect();
     let end = if words.len() == 1 { "," } else { "" };
@@ -78,7 +78,7 @@ pub(crate) fn list<T>(count: usize) -> PyResult<Vec<T>> {
     Ok(list)
 }
 
-/// A list of `count` times the same.
+/// A list of `count` copies of `value`.
 pub(crate) fn filled<T: Clone>(value: T, count: usize) -> PyResult<Vec<T>> {
     let mut list = list(count)?;
     list.resize(count, value);

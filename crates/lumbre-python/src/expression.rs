@@ -119,7 +119,7 @@ impl Expression {
     }
 }
 
-/// The lesser of two numbers, of which either may be the one.
+/// The lesser of two numbers.
 fn least(a: Dual, b: Dual) -> Dual {
     if a.value.high < b.value.low {
         return a;

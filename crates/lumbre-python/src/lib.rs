@@ -1,4 +1,5 @@
-//! The native half of the Python package `lumbre`. What users see is in `python/lumbre`: it checks and names, this computes.
+//! The native half of the Python package `lumbre`. What users see is in `python/lumbre`: it checks and names, this
+//! computes.
 
 mod cast;
 mod columns;

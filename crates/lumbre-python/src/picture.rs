@@ -202,7 +202,7 @@ impl Picture {
         Ok(Some(PyArray1::from_slice(py, alpha).reshape(shape)?.unbind()))
     }
 
-    /// An AOV, (h, w, 3), of which the first channels count; `None` where it was not rendered.
+    /// An AOV, (h, w, 3); only the first channels count; `None` where it was not rendered.
     fn feature(&self, py: Python<'_>, name: &str) -> PyResult<Option<(Py<PyArray3<f32>>, usize)>> {
         let feature = features(&[name.to_owned()])?[0];
         let Some(image) = self.picture.feature(feature) else { return Ok(None) };

@@ -31,8 +31,8 @@ impl First {
     }
 }
 
-/// The nearest point of all surfaces, for every point: its distance as `t`, and the columns of a hit that have a meaning here. A point
-/// that has no answer has nan for distance; then it says why the first of them has none.
+/// The nearest point of all surfaces, for every point: its distance as `t`, and the columns of a hit that have a
+/// meaning here. A point that has no answer has nan for distance; then it says why the first of them has none.
 pub(crate) fn closest<T: Real>(
     py: Python<'_>,
     scene: &Scene,

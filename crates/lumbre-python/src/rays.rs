@@ -74,8 +74,8 @@ fn is_aligned<T: Real>(array: &Bound<'_, PyArray2<T>>) -> bool {
     array.strides().iter().all(is_whole) && array.data().is_aligned()
 }
 
-/// The ray of arrays that are ready to be read and have one; `None` for others. Its numbers are copied, for to borrow the arrays takes
-/// longer than the ray.
+/// The ray of arrays that are ready to be read and have one; `None` for others. Its numbers are copied, for to borrow
+/// the arrays takes longer than the ray.
 pub(crate) fn single<T: Real>(
     origins: &Bound<'_, PyAny>,
     directions: &Bound<'_, PyAny>,

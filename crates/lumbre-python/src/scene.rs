@@ -105,7 +105,8 @@ impl Scene {
         Ok((Self::new(scene, desc.into(), origin, name, files, settings), diagnostics.lines()))
     }
 
-    /// Builds a scene of shapes, of shapes with many places each, and of whole scenes, with cameras and lights besides theirs.
+    /// Builds a scene of shapes, of shapes with many places each, and of whole scenes, with cameras and lights besides
+    /// theirs.
     #[staticmethod]
     fn build(
         py: Python<'_>,
@@ -148,7 +149,7 @@ impl Scene {
         }
         drop(builder);
         let mut desc = desc.unwrap_or_default();
-        // Those that are given come first, and the first is the default.
+        // The given ones come first, and the first is the default.
         let given = cameras.iter().map(|camera| camera.get().0.clone());
         desc.cameras.splice(0..0, given);
         desc.lights.extend(lights.iter().map(|light| LightDesc::clone(&light.get().0)));
@@ -187,7 +188,8 @@ impl Scene {
         })
     }
 
-    /// The closest hits as new arrays by name, for arrays that are ready to be read; `None` for what Python has to look at first.
+    /// The closest hits as new arrays by name, for arrays that are ready to be read; `None` for what Python has to look
+    /// at first.
     fn cast_ready<'py>(
         &self,
         py: Python<'py>,
@@ -221,7 +223,8 @@ impl Scene {
         })
     }
 
-    /// Whether anything is hit, as a new array, for arrays that are ready to be read; `None` for what Python has to look at first.
+    /// Whether anything is hit, as a new array, for arrays that are ready to be read; `None` for what Python has to
+    /// look at first.
     fn occluded_ready<'py>(
         &self,
         py: Python<'py>,
@@ -268,8 +271,8 @@ impl Scene {
         })
     }
 
-    /// The nearest points of all surfaces, into the arrays of `out`. Says why some points have no answer, where there are such: their
-    /// distance is nan.
+    /// The nearest points of all surfaces, into the arrays of `out`. Says why some points have no answer, where there
+    /// are such: their distance is nan.
     fn closest_point(
         &self,
         py: Python<'_>,
@@ -323,7 +326,7 @@ impl Scene {
             true => Some(Job { shown: look.named()?, ..self.job(&options, settings)? }),
             false => None,
         };
-        // The render has threads of its own; those that wait for it here look for Ctrl-C.
+        // The render has threads of its own; the ones that wait for it here check for Ctrl-C.
         let rendered = py.detach(|| {
             std::thread::scope(|scope| {
                 let (done, waits) = mpsc::channel();
@@ -404,7 +407,8 @@ impl Scene {
         self.scene.options().stop.spp
     }
 
-    /// An explanation of a pixel, or of a ray (its origin, its direction and its range), written in a format; options as of a render.
+    /// An explanation of a pixel, or of a ray (its origin, its direction and its range), written in a format; options
+    /// as of a render.
     #[expect(clippy::too_many_arguments, reason = "one call of the package's own")]
     fn explain(
         &self,
@@ -483,7 +487,7 @@ impl Progress for Watch {
 }
 
 impl Watch {
-    /// Calls `tells(samples, total, share)`, where something has changed.
+    /// Calls `tells(samples, total, share)` if something has changed.
     fn tell(&self, py: Python<'_>, tells: Option<&Py<PyAny>>) -> PyResult<()> {
         let Some(tells) = tells else { return Ok(()) };
         let Some(state) = self.0.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
@@ -601,7 +605,7 @@ impl Scene {
 
 /// Refuses a picture that would not fit into memory.
 fn check_memory(options: &RenderOptions) -> PyResult<()> {
-    // The arrays of numpy, each of which is made of another list: the picture, its alpha, and a feature.
+    // The arrays of numpy, each made of another list: the picture, its alpha, and a feature.
     const ARRAYS: u64 = 64;
     let pixels = options.bounds().map_err(lumbre::Error::from).map_err(raised)?.area();
     let rendered = options.memory_bytes().map_err(lumbre::Error::from).map_err(raised)?;

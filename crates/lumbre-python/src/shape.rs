@@ -251,8 +251,8 @@ impl Geometry {
         Ok(Self { shape: ShapeBuilder::csg(operation, operands), leaves, depth })
     }
 
-    /// Triangles or quads of (V, 3) vertices in double precision and (F, 3) or (F, 4) faces. `is_precise` says whether rays meet
-    /// triangles at these vertices, or at what they are in single precision.
+    /// Triangles or quads of (V, 3) vertices in double precision and (F, 3) or (F, 4) faces. `is_precise` says whether
+    /// rays meet triangles at these vertices, or at what they are in single precision.
     #[staticmethod]
     fn mesh(
         vertices: PyReadonlyArray2<'_, f64>,
@@ -343,7 +343,7 @@ impl Light {
         Ok(Self::of(LightDesc::Point { from, intensity: colour("intensity", intensity)? }))
     }
 
-    /// A cone of this half-angle in degrees, of which the outer part fades out.
+    /// A cone of this half-angle in degrees, whose outer part fades out.
     #[staticmethod]
     fn spot(
         position: Triple,
@@ -472,8 +472,8 @@ impl Camera {
         Ok(Self(camera.map_err(|_| no_view(eye, target, up))?.with_lens(lens_radius)))
     }
 
-    /// A pinhole by the lines of a picture: x0, x1, y0, y1 of its edges at distance 1, and the place of its camera, whose axes are x to
-    /// the right, y upwards and z backwards.
+    /// A pinhole by the lines of a picture: x0, x1, y0, y1 of its edges at distance 1, and the place of its camera,
+    /// whose axes are x to the right, y upwards and z backwards.
     #[staticmethod]
     fn pinhole(window: [f64; 4], pose: [[f64; 4]; 4]) -> PyResult<Self> {
         // Camera space is left-handed: its z goes forwards.

@@ -1,4 +1,5 @@
-//! A scene as its pictures show it: on a stage, with overrides. Pictures that differ in cameras and lights alone share a tree.
+//! A scene as its pictures show it: on a stage, with overrides. Pictures that differ in cameras and lights alone share
+//! a tree.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -239,7 +240,8 @@ impl SceneRequest {
 
 /// One of the last that were kept; it counts as the last from now on.
 fn found<T: Clone>(kept: &Mutex<Vec<T>>, is_wanted: impl Fn(&T) -> bool) -> Option<T> {
-    // Nothing is built while this is locked: a thread of the pool that waits for its work takes up other work, which may want this, too.
+    // Nothing is built while this is locked: a thread of the pool that waits for its work takes up other work, which
+    // may want this, too.
     let mut kept = kept.lock().unwrap_or_else(PoisonError::into_inner);
     let position = kept.iter().position(is_wanted)?;
     let wanted = kept.remove(position);

@@ -31,7 +31,7 @@ impl Stop {
     }
 }
 
-/// One thread a core, or as many as `RAYON_NUM_THREADS` says. A fork has the memory of its parent, but none of its threads, so that
+/// One thread per core, or `RAYON_NUM_THREADS`. A fork has the memory of its parent, but none of its threads, so that
 /// it gets a pool of its own.
 pub(crate) fn pool() -> PyResult<Arc<ThreadPool>> {
     let mut slot = POOL.lock().unwrap_or_else(PoisonError::into_inner);
@@ -47,8 +47,8 @@ pub(crate) fn pool() -> PyResult<Arc<ThreadPool>> {
     Ok(pool)
 }
 
-/// Does work on the pool, without the interpreter's lock. What Ctrl-C raises ends it, and is returned once it has ended; so is what
-/// `meanwhile` raises, which is called now and then on the calling thread.
+/// Does work on the pool, without the interpreter's lock. What Ctrl-C raises ends it, and is returned once it has
+/// ended; so is what `meanwhile` raises, which is called now and then on the calling thread.
 pub(crate) fn interruptible<R: Send>(
     py: Python<'_>,
     work: impl FnOnce(&Stop) -> R + Send,

@@ -116,8 +116,8 @@ def test_an_explanation_is_data_that_a_notebook_shows(model: Path) -> None:
 @pytest.mark.parametrize(
     "asked, message",
     [
-        ({}, "either a pixel or a ray"),
-        ({"pixel": (1, 1), "ray": ((0, 0, 0), (0, 0, 1))}, "either a pixel or a ray"),
+        ({}, "expected either a pixel or a ray"),
+        ({"pixel": (1, 1), "ray": ((0, 0, 0), (0, 0, 1))}, "expected either a pixel or a ray"),
         ({"pixel": (8, 1), "size": (8, 6)}, r"outside of the picture \(expected less than \(8, 6\)\)"),
         ({"ray": ((0, 0, 0), (0, 0, 0))}, "no ray"),
         ({"ray": ((0, 0, np.nan), (0, 0, 1))}, "no ray"),

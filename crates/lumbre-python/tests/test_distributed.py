@@ -1,4 +1,4 @@
-"""Many machines: on a cluster of processes here, some of which die, freeze or are slow."""
+"""Many machines: on a cluster of local processes, some of which die, freeze or are slow."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ HAPPENED: list[str] = []
 
 
 class Accidents(threading.Thread):
-    """Kills, freezes and wakes workers, as a seed says, until it is stopped. Others are started for those that are killed."""
+    """Kills, freezes and wakes workers, as a seed says, until it is stopped. Killed ones are replaced."""
 
     def __init__(self, farm: Farm, seed: int) -> None:
         super().__init__(daemon=True)

@@ -15,7 +15,7 @@ from conftest import random_rays
 
 import lumbre
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read as Linux tells it")
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the memory of a process is read as Linux reports it")
 
 
 def own_memory() -> int:

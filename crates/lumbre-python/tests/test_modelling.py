@@ -77,7 +77,7 @@ def test_what_makes_no_csg_is_refused() -> None:
 
 
 def flat(material: lumbre.Material | None, **more: object) -> lumbre.Scene:
-    """A square, of which three units a side are seen, from straight above: x and u to the right, y and v up, uv from 0 to 1."""
+    """A square; three units of each side are visible, from straight above: x and u to the right, y and v up, uv from 0 to 1."""
     corners = np.array([[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]], dtype=np.float32)
     uvs = corners[:, :2] / 3 + 0.5
     square = lumbre.Mesh(corners, [[0, 1, 2], [0, 2, 3]], uvs=uvs, material=material, **more)
@@ -263,7 +263,7 @@ def test_mixtures_that_share_mixtures_are_compared_hashed_and_written_once() -> 
 
 def test_a_noise_that_is_not_reached_is_said() -> None:
     scene = lumbre.Scene([lumbre.Sphere()], lights=[lumbre.PointLight((3, -4, 5), 200)])
-    with pytest.warns(UserWarning, match="that of 0.001 was not reached: more spp goes on"):
+    with pytest.warns(UserWarning, match="not below the target 0.001: give more spp"):
         image = scene.render(20, (16, 12), noise=0.001, denoise=False)
     stats = image.stats
     assert stats["noise_target"] == 0.001 and stats["noise_target_met"] is False

@@ -258,7 +258,7 @@ def test_loose_options_are_answered_with_what_is_accepted(options: dict[str, Any
 def test_numbers_of_numpy_are_options() -> None:
     scene = lumbre.Scene([lumbre.Sphere()])
     size, seed, transparent = np.array([8, 6]), np.uint64(3), np.bool_(True)
-    with pytest.warns(UserWarning, match="the noise is not known yet, and that of 0.5 was not reached"):
+    with pytest.warns(UserWarning, match="the noise is not known yet, not below the target 0.5"):
         image = scene.render(np.int64(1), size, seed=seed, noise=np.float32(0.5), transparent=transparent)
     assert image.shape == (6, 8, 3)
 

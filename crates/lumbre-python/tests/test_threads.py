@@ -27,7 +27,7 @@ def listens() -> Iterator[None]:
 
 def test_ctrl_c_ends_a_cast_and_a_render_soon(mixed: lumbre.Scene, listens: None) -> None:
     origins, directions = random_rays(2000)
-    # As many rays as take a minute or more, at no memory.
+    # Enough rays for a minute or more, without memory.
     many = np.broadcast_to(origins[:1], (100_000_000, 3)), np.broadcast_to(directions[:1], (100_000_000, 3))
     out = np.empty(100_000_000, dtype=np.bool_)
     for work in (

@@ -1,4 +1,4 @@
-"""The drop-in for trimesh: beside its own intersector, and in its own tests where they are there."""
+"""The drop-in for trimesh: against its own intersector, and in its own tests if they are present."""
 
 from __future__ import annotations
 

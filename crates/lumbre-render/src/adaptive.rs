@@ -25,8 +25,8 @@ pub(crate) struct Adaptive {
 /// By how much an estimate from n samples is raised, times √n.
 const CAUTION: f64 = 2.0;
 impl Adaptive {
-    /// For a noise limit and a trial of the whole picture. Every pixel gets at least `min_spp` samples, or as many as
-    /// the trial requires.
+    /// For a noise limit and a trial of the whole picture. Every pixel gets at least `min_spp` samples, or the number
+    /// that the trial requires.
     pub(crate) fn new(limit: f64, min_spp: Option<u32>, trial: Trial) -> Self {
         let min_spp = min_spp.unwrap_or_else(|| trial.min_spp());
         Self { limit, min_spp, floor: FLOOR * trial.mean.max(0.0), trial }

@@ -1,4 +1,4 @@
-//! How far a render is, on its way to whichever of its limits comes first.
+//! The progress of a render towards the limit that comes first.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -11,7 +11,7 @@ use crate::{Progress, State, Stop};
 /// Time between two reports.
 const REPORT_EVERY: Duration = Duration::from_millis(100);
 
-/// Counts samples, and tells of them now and then.
+/// Counts samples, and reports progress at intervals.
 pub(crate) struct Clock<'a> {
     start: Instant,
     /// The time from the start to the first sample.
@@ -21,9 +21,10 @@ pub(crate) struct Clock<'a> {
     done: AtomicU64,
     /// Rays of this run.
     rays: AtomicU64,
-    /// Samples that an earlier run took.
+    /// Samples of an earlier run.
     before: u64,
-    /// Samples a pixel at which the noise is expected to be low enough, as the bits of an f64; infinite before it is known.
+    /// Samples a pixel at which the noise is expected to be low enough, as the bits of an f64; infinite before it is
+    /// known.
     quiet_at: AtomicU64,
     last: Mutex<Instant>,
     progress: &'a dyn Progress,
@@ -54,7 +55,7 @@ impl<'a> Clock<'a> {
         }
     }
 
-    /// Says at how many samples a pixel the noise is expected to be low enough.
+    /// Sets the number of samples per pixel at which the noise target is expected to be met.
     pub(crate) fn expect_quiet_at(&self, spp: f64) {
         self.quiet_at.store(spp.to_bits(), Ordering::Relaxed);
     }
@@ -63,7 +64,7 @@ impl<'a> Clock<'a> {
     pub(crate) fn add(&self, samples: u64, rays: u64) {
         self.rays.fetch_add(rays, Ordering::Relaxed);
         let done = self.done.fetch_add(samples, Ordering::Relaxed) + samples;
-        // A thread that finds another one reporting goes on with its work.
+        // If another thread is reporting, this one continues its work.
         let Ok(mut last) = self.last.try_lock() else { return };
         let now = Instant::now();
         if now.duration_since(*last) < REPORT_EVERY {
@@ -152,7 +153,7 @@ mod tests {
     fn what_an_earlier_run_took_is_no_work_of_this_one() {
         let stop = Stop::at(8);
         let clock = Clock::new(Instant::now(), Duration::ZERO, 200, stop, 400, &NoProgress);
-        // 800 of 1600 samples, 400 of them in 2 s: as many again are left twice.
+        // 800 of 1600 samples, 400 of them in 2 s: the same number is left twice.
         let state = clock.state(800, Duration::from_secs(2));
         assert_eq!((state.share, state.left), (0.5, Some(Duration::from_secs(4))));
     }

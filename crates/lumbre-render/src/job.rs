@@ -100,18 +100,7 @@ pub fn render_from(
     let bounds = options.bounds()?;
     let pixel_sampler = PixelSampler::new(scene, options, integrator)?;
     let spp = options.stop.spp.max(1);
-    let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
-    let extras = Extras {
-        features: options.features,
-        tints: options.transparent && catches_shadows,
-        guides: options.guides,
-        surfaces: matches!(options.film, FilmKind::GBuffer(_)),
-        buckets: match options.film {
-            FilmKind::Spectral(buckets) => Some(buckets),
-            FilmKind::Rgb | FilmKind::GBuffer(_) => None,
-        },
-        depth_unit: depth_unit(scene, &pixel_sampler.view),
-    };
+    let extras = extras_of(scene, options, &pixel_sampler.view);
     let mut tiles = match state {
         Some(state) => tiles_of(state, bounds, extras, options.first_sample)?,
         None => bounds.tiles(TILE).into_iter().map(|tile| TileState::new(Tile::new(tile, extras))).collect(),
@@ -133,7 +122,7 @@ pub fn render_from(
     let job = Job {
         options,
         pixel_sampler,
-        pixels: bounds.area(),
+        bounds,
         adaptive,
         deadline,
         cancel,
@@ -141,90 +130,25 @@ pub fn render_from(
         clock: Clock::new(start, start.elapsed(), bounds.area(), options.stop, before, progress),
         waves: Mutex::default(),
     };
-    let expect_quiet = |tiles: &[TileState]| {
-        let Some(adaptive) = &job.adaptive else { return };
-        let pixels = tiles
-            .iter()
-            .flat_map(|tile_state| tile_state.tile.bounds().pixels().zip(tile_state.tile.pixels()));
-        let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
-        job.clock.expect_quiet_at(expected / bounds.area() as f64);
-    };
-    expect_quiet(&tiles);
+    job.expect_quiet(&tiles);
     let hand_over = |tiles: &[TileState]| {
         if let (Some(sink), Some(pause)) = (sink, &job.pause) {
             (sink.keep)(state_of(tiles.to_vec(), bounds, options));
             pause.start_again();
         }
     };
-    let least_wanted = |tiles: &[TileState]| {
-        tiles
-            .iter()
-            .filter_map(|tile_state| adaptive::least_wanted(&tile_state.tile, job.adaptive.as_ref()))
-            .min()
-    };
-    // Considers pixels that need more.
-    let has = |tiles: &[TileState], samples| least_wanted(tiles).is_none_or(|least| least >= samples);
-
-    let mut stride = None;
-    let mut last = None;
-    if least_taken(&tiles) >= 1 {
-        stride = Some(1);
-    } else {
-        for side in STRIDES {
-            loop {
-                workers.for_each(&mut tiles, |tile_state| {
-                    job.run_coarsely(tile_state, (bounds.x0, bounds.y0), side, last)
-                });
-                if job.must_stop_at(side) || tiles.iter().all(|tile_state| tile_state.next_side <= side) {
-                    break;
-                }
-                hand_over(&tiles);
-            }
-            last = Some(side);
-            if tiles.iter().any(|tile_state| tile_state.next_side > side) {
-                break;
-            }
-            stride = Some(side);
-        }
+    let stride = job.take_coarse_passes(&workers, &mut tiles, &hand_over);
+    if stride == Some(1) {
+        // The earlier run has reported its own samples.
+        let done = if before > 0 { job.least_wanted(&tiles).unwrap_or(spp).min(spp) } else { 0 };
+        job.take_passes(&workers, &mut tiles, done, progress, &hand_over);
     }
-    // The earlier run has reported its own samples.
-    let mut done = if before > 0 { least_wanted(&tiles).unwrap_or(spp).min(spp) } else { 0 };
-    while done < spp && stride == Some(1) {
-        let end = next_count(done).min(spp);
-        loop {
-            workers.for_each(&mut tiles, |tile_state| job.run(tile_state, end));
-            if job.must_stop() || has(&tiles, end) {
-                break;
-            }
-            hand_over(&tiles);
-        }
-        if !has(&tiles, end) {
-            break;
-        }
-        done = end;
-        if job.must_stop() {
-            // The rest takes time for a large picture.
-            break;
-        }
-        let tiles = || tiles.iter().map(|tile_state| &tile_state.tile);
-        let reached = noise(tiles(), bounds, job.adaptive.as_ref());
-        progress.pass(&Snapshot {
-            spp: done,
-            noise: reached,
-            picture: &|| picture(tiles(), bounds, options.transparent),
-        });
-        expect_quiet(&tiles);
-        if job.must_stop() || least_wanted(&tiles).is_none() {
-            break;
-        }
-    }
-
     if !progress.is_wanted() {
         return Err(RenderError::Unwanted);
     }
     progress.stopped(stride);
     let spread = stride.filter(|side| *side > 1).map(|side| spread(&tiles, bounds, side));
-    let is_done = has(&tiles, spp);
+    let is_done = job.has(&tiles, spp);
     let state = state_of(tiles, bounds, options);
     let shown = spread.as_ref().unwrap_or(&state.tiles);
     let rendered = rendered_of(shown.iter(), bounds, options.transparent, extras);
@@ -246,6 +170,22 @@ pub fn render_from(
         elapsed: start.elapsed(),
     };
     Ok((Rendered { stats, ..rendered }, state))
+}
+
+/// What the film keeps besides colours.
+fn extras_of(scene: &Scene, options: &RenderOptions, view: &View) -> Extras {
+    let catches_shadows = scene.ground().is_some_and(|ground| ground.catcher);
+    Extras {
+        features: options.features,
+        tints: options.transparent && catches_shadows,
+        guides: options.guides,
+        surfaces: matches!(options.film, FilmKind::GBuffer(_)),
+        buckets: match options.film {
+            FilmKind::Spectral(buckets) => Some(buckets),
+            FilmKind::Rgb | FilmKind::GBuffer(_) => None,
+        },
+        depth_unit: depth_unit(scene, view),
+    }
 }
 
 /// The samples of the pixel with the fewest.
@@ -277,7 +217,7 @@ fn depth_unit(scene: &Scene, view: &View) -> f64 {
     if unit.is_normal() { unit } else { 1.0 }
 }
 
-/// The owners of a state's tiles.
+/// The tiles of a state, whose counters go to the first.
 fn tiles_of(
     state: RenderState,
     bounds: PixelBounds,
@@ -365,7 +305,7 @@ fn spread(tiles: &[TileState], bounds: PixelBounds, side: u32) -> Vec<Tile> {
 struct Job<'a> {
     options: &'a RenderOptions,
     pixel_sampler: PixelSampler<'a>,
-    pixels: u64,
+    bounds: PixelBounds,
     /// When a pixel has enough samples; `None` to take the same number everywhere.
     adaptive: Option<Adaptive>,
     deadline: Option<Instant>,
@@ -430,10 +370,104 @@ impl TileState {
 }
 
 impl Job<'_> {
+    /// Takes one sample in each square, of ever smaller sides, then one in each pixel. Returns the side of the last
+    /// whole pass; `None` if even the first was stopped. `hand_over` receives the tiles at each pause.
+    fn take_coarse_passes(
+        &self,
+        workers: &Workers,
+        tiles: &mut [TileState],
+        hand_over: &dyn Fn(&[TileState]),
+    ) -> Option<u32> {
+        if least_taken(tiles) >= 1 {
+            return Some(1);
+        }
+        let corner = (self.bounds.x0, self.bounds.y0);
+        let mut last = None;
+        for side in STRIDES {
+            loop {
+                workers.for_each(tiles, |tile_state| self.run_coarsely(tile_state, corner, side, last));
+                if self.must_stop_at(side) || tiles.iter().all(|tile_state| tile_state.next_side <= side) {
+                    break;
+                }
+                hand_over(tiles);
+            }
+            if tiles.iter().any(|tile_state| tile_state.next_side > side) {
+                break;
+            }
+            last = Some(side);
+        }
+        last
+    }
+
+    /// Takes passes over all pixels, from `done` samples on, until there are enough or it must stop. `hand_over`
+    /// receives the tiles at each pause.
+    fn take_passes(
+        &self,
+        workers: &Workers,
+        tiles: &mut [TileState],
+        mut done: u32,
+        progress: &dyn Progress,
+        hand_over: &dyn Fn(&[TileState]),
+    ) {
+        let spp = self.options.stop.spp.max(1);
+        while done < spp {
+            let end = next_count(done).min(spp);
+            loop {
+                workers.for_each(tiles, |tile_state| self.run(tile_state, end));
+                if self.must_stop() || self.has(tiles, end) {
+                    break;
+                }
+                hand_over(tiles);
+            }
+            if !self.has(tiles, end) {
+                return;
+            }
+            done = end;
+            if self.must_stop() {
+                // The rest takes time for a large picture.
+                return;
+            }
+            let film = || tiles.iter().map(|tile_state| &tile_state.tile);
+            progress.pass(&Snapshot {
+                spp: done,
+                noise: noise(film(), self.bounds, self.adaptive.as_ref()),
+                picture: &|| picture(film(), self.bounds, self.options.transparent),
+            });
+            self.expect_quiet(tiles);
+            if self.must_stop() || self.least_wanted(tiles).is_none() {
+                return;
+            }
+        }
+    }
+
+    /// Predicts the end of a render to a noise target.
+    fn expect_quiet(&self, tiles: &[TileState]) {
+        let Some(adaptive) = &self.adaptive else { return };
+        let spp = self.options.stop.spp.max(1);
+        let pixels = tiles
+            .iter()
+            .flat_map(|tile_state| tile_state.tile.bounds().pixels().zip(tile_state.tile.pixels()));
+        let expected: f64 = pixels.map(|((x, y), pixel)| adaptive.expected(x, y, pixel, spp)).sum();
+        self.clock.expect_quiet_at(expected / self.bounds.area() as f64);
+    }
+
+    /// The fewest samples of a pixel that needs more; `None` if none does.
+    fn least_wanted(&self, tiles: &[TileState]) -> Option<u32> {
+        tiles
+            .iter()
+            .filter_map(|tile_state| adaptive::least_wanted(&tile_state.tile, self.adaptive.as_ref()))
+            .min()
+    }
+
+    /// Whether all pixels that need more have this many samples.
+    fn has(&self, tiles: &[TileState], samples: u32) -> bool {
+        self.least_wanted(tiles).is_none_or(|least| least >= samples)
+    }
+
     /// Whether the squares of this side must stop. The clock stops neither the first squares nor few samples: see
     /// [`UNSTOPPED`].
     fn must_stop_at(&self, side: u32) -> bool {
-        let count = self.pixels.div_ceil(u64::from(side) * u64::from(side));
+        let count = self.bounds.area().div_ceil(u64::from(side) * u64::from(side));
         if side == STRIDES[0] || count <= UNSTOPPED { self.cancel.is_cancelled() } else { self.must_stop() }
     }
 

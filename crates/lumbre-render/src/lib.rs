@@ -41,7 +41,7 @@
 //! # The same bytes, however a render is run
 //!
 //! - A sample is a function of scene, options, seed, pixel and index.
-//! - A pixel's sums are integers in units of 2⁻⁶³ (`film/exact.rs`). Each addend is rounded once, by itself. Adding is
+//! - A pixel's sums are integers in units of 2⁻⁶³ (`film/exact.rs`). Each addend is rounded once. Adding is
 //!   exact, so it is associative and commutative, and tiles, threads, ranges of samples, crops and the order of merges
 //!   cannot change a pixel. This costs under 2 % of the time (`docs/measurements/costs.md`). The denoiser's guides are
 //!   the exception: they are f32, in sample order, and cannot be merged.

@@ -1,11 +1,12 @@
-//! What to expect of the samples of a pixel, by those of its neighbourhood.
+//! Expected statistics of the samples of a pixel, from those of its neighbourhood.
 
 use crate::film::Pixel;
 
-/// The share of the picture's mean luminance that is added to that of each pixel, so that black pixels count for little.
+/// The share of the picture's mean luminance that is added to that of each pixel, so that black pixels count for
+/// little.
 pub(crate) const FLOOR: f64 = 0.1;
 
-/// How many samples of this variance have a mean with an error of `allowed`.
+/// The number of samples of this variance whose mean has an error of `allowed`.
 pub(crate) fn needed(variance: f64, allowed: f64) -> f64 {
     if variance > 0.0 { variance / (allowed * allowed) } else { 0.0 }
 }
@@ -13,19 +14,19 @@ pub(crate) fn needed(variance: f64, allowed: f64) -> f64 {
 /// Sums over the luminances of samples. Those of several pixels add up.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Spread {
-    /// How many samples.
+    /// Number of samples.
     pub(crate) samples: f64,
     sum: f64,
     /// Samples, less one for each pixel whose mean was subtracted.
     freedom: f64,
     /// Σ (luminance − mean of its pixel)².
     squares: f64,
-    /// Σ (luminance − mean of its pixel)⁴, and what is too much in it.
+    /// Σ (luminance − mean of its pixel)⁴, and its bias.
     fourths: f64,
     excess: f64,
 }
 
-/// What is known of a pixel: how many samples it has, the mean of their luminances, and its standard error.
+/// Statistics of a pixel: the number of its samples, their mean luminance, and its standard error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Known {
     pub(crate) samples: f64,
@@ -33,8 +34,8 @@ pub(crate) struct Known {
     pub(crate) error: f64,
 }
 
-/// The samples in a part of the picture: their mean, their variance, and how many of them it takes to know it. Rare light has a kurtosis of
-/// about one over its frequency.
+/// The samples in a part of the picture: their mean, their variance, and the number of samples that a reliable variance
+/// needs. Rare light has a kurtosis of about one over its frequency.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Expectation {
     pub(crate) mean: f64,
@@ -42,8 +43,8 @@ pub(crate) struct Expectation {
     pub(crate) kurtosis: f64,
 }
 
-/// The central moments of the luminances of a pixel, sample by sample (Pébay, "Formulas for robust, one-pass parallel computation of
-/// covariances and arbitrary-order statistical moments", Sandia report SAND2008-6212, 2008).
+/// The central moments of the luminances of a pixel, sample by sample (Pébay, "Formulas for robust, one-pass parallel
+/// computation of covariances and arbitrary-order statistical moments", Sandia report SAND2008-6212, 2008).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Moments {
     count: f64,
@@ -73,7 +74,7 @@ impl Moments {
 const KNOWN: f64 = 8.0;
 
 impl Known {
-    /// `None` where there are fewer than two samples.
+    /// `None` for fewer than two samples.
     pub(crate) fn of(pixel: &Pixel) -> Option<Self> {
         let (mean, error) = pixel.luminance_with_error()?;
         Some(Self { samples: f64::from(pixel.samples), mean, error })
@@ -81,7 +82,7 @@ impl Known {
 }
 
 impl Spread {
-    /// Of a pixel of which all samples are known.
+    /// Of a pixel with all samples known.
     pub(crate) fn of(moments: &Moments) -> Self {
         Self {
             samples: moments.count,
@@ -93,7 +94,7 @@ impl Spread {
         }
     }
 
-    /// Of a pixel of which the mean and the variance are known. How far the variances of n samples differ from pixel to pixel tells the
+    /// Of a pixel with known mean and variance. The spread of the variances of n samples between pixels gives the
     /// kurtosis κ: the mean of their squares is σ⁴ (1 + (κ − 1) / n).
     pub(crate) fn of_pixel(Known { samples: n, mean, error }: Known) -> Self {
         let variance = error * error * n;
@@ -118,7 +119,7 @@ impl Spread {
         }
     }
 
-    /// What these samples say alone.
+    /// The estimate of these samples alone.
     pub(crate) fn expectation(&self) -> Expectation {
         let mean = if self.samples > 0.0 { self.sum / self.samples } else { 0.0 };
         if self.freedom <= 0.0 || self.squares <= 0.0 {
@@ -129,12 +130,12 @@ impl Spread {
         Expectation { mean, variance, kurtosis: kurtosis.max(1.0) }
     }
 
-    /// What these samples say, which are a part of those that led to `wider`.
+    /// The estimate of these samples, which are a part of those behind `wider`.
     pub(crate) fn within(&self, wider: Expectation) -> Expectation {
         let own = self.expectation();
         let (n, k) = (self.samples, wider.kurtosis);
         let mean = |own: f64, wider: f64| if n + k > 0.0 { (n * own + k * wider) / (n + k) } else { 0.0 };
-        // Of a few samples of rare light, those are bright that have met it, and all others dark: no mean is taken of them.
+        // A few samples of rare light are either very bright or dark: their mean is not used.
         let is_known = n >= KNOWN * k && n > 0.0;
         Expectation {
             mean: if is_known { own.mean } else { wider.mean },
@@ -144,7 +145,7 @@ impl Spread {
     }
 }
 
-/// A grid over a picture, and what to expect in each of its cells.
+/// A grid over a picture, with expected statistics in each cell.
 #[derive(Clone, Debug)]
 pub(crate) struct Neighbourhoods {
     width: usize,
@@ -174,8 +175,8 @@ impl Neighbourhoods {
         rows.flatten().fold(Spread::default(), Spread::and)
     }
 
-    /// Halves a part of the picture until it is two cells wide: each half believes its own samples as far as there are enough of them,
-    /// and the rest what is expected of the whole.
+    /// Halves a part of the picture until it is two cells wide. Each half weights its own samples by their number
+    /// against the expectation of the whole.
     fn refine(&mut self, spreads: &[Spread], from: [usize; 2], to: [usize; 2], expected: Expectation) {
         let size = [to[0] - from[0], to[1] - from[1]];
         let axis = usize::from(size[1] > size[0]);
@@ -194,7 +195,7 @@ impl Neighbourhoods {
         }
     }
 
-    /// What to expect of the samples of a pixel.
+    /// The expected statistics of the samples of a pixel.
     pub(crate) fn at(&self, x: u32, y: u32) -> Expectation {
         let place = |pixel: u32, axis: usize, count: usize| {
             ((f64::from(pixel) + 0.5) / self.scale[axis]).min(count as f64 - 1.0) as usize
@@ -202,7 +203,7 @@ impl Neighbourhoods {
         self.expectations[place(y, 1, self.height) * self.width + place(x, 0, self.width)]
     }
 
-    /// Those of all cells.
+    /// The expected statistics of all cells.
     pub(crate) fn all(&self) -> &[Expectation] {
         &self.expectations
     }

@@ -4,14 +4,14 @@ use crate::adaptive::Adaptive;
 use crate::film::{PixelBounds, Tile};
 use crate::neighbourhoods::{FLOOR, Known, Neighbourhoods, Spread};
 
-/// So few bright samples tell no mean.
+/// With fewer bright samples there is no usable mean.
 const FEW: f64 = 2.0;
 /// Cells along the longer side of the grid of neighbourhoods.
 const SIDE: u32 = 256;
-/// Rows whose pixels are looked at at once.
+/// Rows whose pixels are processed at once.
 const STRIP: u32 = 16;
 
-/// What is known of the pixels of a strip, row by row.
+/// Statistics of the pixels of a strip, row by row.
 fn known_within<'t>(tiles: impl Iterator<Item = &'t Tile>, strip: PixelBounds) -> Vec<Option<Known>> {
     let mut known = vec![None; strip.area() as usize];
     for tile in tiles {
@@ -22,11 +22,11 @@ fn known_within<'t>(tiles: impl Iterator<Item = &'t Tile>, strip: PixelBounds) -
     known
 }
 
-/// The noise of the tiles of a picture, as [`crate::Stop::noise`] defines it; `None` where no pixel has two samples.
+/// The noise of the tiles of a picture, as [`crate::Stop::noise`] defines it; `None` if no pixel has two samples.
 ///
-/// A pixel of n samples with light in one of them has an error as large as its luminance, and knows not how rare that light is. So the
-/// luminance that its error is measured against is that of its neighbourhood, as far as that is less and its own is in doubt. And light that the trial has met, and
-/// these pixels not yet, counts as far as they have too few samples for it.
+/// A pixel with light in one of its n samples has an error as large as its luminance, and cannot tell how rare that
+/// light is. So its error is divided by the luminance of its neighbourhood, if that is smaller and its own is
+/// uncertain. Light that only the trial has met counts as far as these pixels have too few samples to meet it.
 pub(crate) fn noise<'t>(
     tiles: impl Iterator<Item = &'t Tile> + Clone,
     bounds: PixelBounds,
@@ -36,7 +36,7 @@ pub(crate) fn noise<'t>(
     let side = width.max(height).div_ceil(SIDE).max(1);
     let columns = width.div_ceil(side) as usize;
     let mut spreads = vec![Spread::default(); columns * height.div_ceil(side) as usize];
-    // The pixels that are known, row by row, with their places in the picture. They are not kept: there may be many.
+    // Pixels with enough samples, row by row, with their positions. They are streamed: there may be many.
     let known_pixels = || {
         let strips = (bounds.y0..bounds.y1).step_by(STRIP as usize);
         let tiles = tiles.clone();
@@ -64,13 +64,13 @@ pub(crate) fn noise<'t>(
     let (mut squares, mut expected, mut kurtosis, mut samples) = (0.0, 0.0, 0.0, 0.0);
     let relative = |square: f64, luminance: f64| {
         let scale = luminance.max(0.0) + floor;
-        // A black picture has no noise that would be seen.
+        // A black picture has no visible noise.
         if scale > 0.0 { square / (scale * scale) } else { 0.0 }
     };
     for ((x, y), known) in known_pixels() {
         let Known { samples: n, mean: luminance, error } = known;
         let around = Spread::of_pixel(known).within(neighbourhoods.at(x, y)).mean;
-        // Of one or two bright samples the mean says nothing; of twenty it does, as at the edge of a lamp.
+        // The mean of one or two bright samples is meaningless; that of twenty, as at the edge of a lamp, is not.
         let doubt = (FEW * (error / luminance.max(f64::MIN_POSITIVE)).powi(2)).min(1.0);
         squares += relative(error * error, luminance - doubt * (luminance - around).max(0.0));
         if let Some(adaptive) = adaptive {
@@ -81,7 +81,7 @@ pub(crate) fn noise<'t>(
         }
     }
     let square = match samples > 0.0 {
-        // How much the samples say beside those of the trial.
+        // The weight of the samples against those of the trial.
         true => {
             let kurtosis = kurtosis / count;
             (samples * squares + kurtosis * expected) / (samples + kurtosis)
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
     use crate::film::{Addition, Exposure, Extras, Sample};
 
-    /// A tile of 64 by 48 pixels of n samples, of which a share has this luminance and the rest 0.1, and its noise.
+    /// A tile of 64 by 48 pixels of n samples; a share has this luminance and the rest 0.1, and its noise.
     fn found(n: u32, share: f64, bright: f64) -> f64 {
         let bounds = PixelBounds::whole(64, 48);
         let mut tile = Tile::new(bounds, Extras::default());
@@ -143,7 +143,7 @@ mod tests {
                 assert_eq!(tile.add(x, y, &sample, &Exposure::default()), Addition::Whole);
             }
         }
-        // An error of 15 / 16 beside a mean of 15, in one pixel of 64.
+        // An error of 15 / 16 against a mean of 15, in one pixel of 64.
         let noise = noise([&tile].into_iter(), bounds, None).unwrap();
         assert!((0.0075..0.0083).contains(&noise), "{noise}");
     }

@@ -15,56 +15,56 @@ use crate::wave::catcher::{Catcher, Places};
 use crate::wave::{Precision, PrimaryHits, SampleId, Wave, WavelengthChoice, cone};
 use crate::{RenderError, RenderOptions};
 
-/// Between the rays that textures are looked up for, in pixels: samples average what is finer. The same for any number of samples, so
-/// that more of them can be added to a render (pbrt takes fewer the wider apart).
+/// Distance in pixels from a camera ray to the two neighbours that define its footprint: samples average finer detail.
+/// It does not depend on the number of samples, so that more can be added to a render; pbrt's shrinks with their
+/// number.
 const SPACING: f64 = 0.25;
 
-/// Takes samples of pixels, each of which depends on its place and its number alone.
+/// Takes samples of pixels. A sample depends only on its pixel and its index.
 pub(crate) struct PixelSampler<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) view: View,
-    /// The rays of the view, where lanes make them.
+    /// The camera, if its rays are made in lanes.
     pinhole: Option<Pinhole>,
     integrator: &'a dyn Integrator,
     sampler: Sampler,
     filter: Filter,
-    /// Whether it matters when a ray looks.
+    /// Whether the scene or the camera moves, so that rays have different times.
     moves: bool,
     /// Whether rays from the camera have footprints.
     has_footprints: bool,
     wants_features: bool,
-    /// Whether the one sample of a pixel is in its middle.
+    /// Whether the only sample of a pixel is at its centre.
     is_centred: bool,
     lights_are_seen: bool,
-    /// Ground that catches shadows, for many samples at once where that can be.
+    /// The shadow catcher, if its samples are computed in lanes.
     catcher: Option<Catcher<'a>>,
     precision: Precision,
-    /// The wavelengths that samples carry, if they do.
+    /// The wavelengths of samples in a spectral render.
     wavelengths: Option<WavelengthChoice>,
     film: FilmKind,
-    /// The camera that records them, if it is not the eye.
+    /// The sensor that turns wavelengths into colours; by default the CIE observer.
     sensor_curves: Option<Arc<SensorCurves>>,
 }
 
-/// What a sample sees besides what an integrator finds.
+/// What a sample sees, besides the radiance of the integrator.
 #[derive(Clone, Copy, Default)]
 struct SeenSample {
-    /// In place of that.
+    /// On a shadow catcher, what replaces that radiance.
     caught: Option<Seen>,
     features: Option<FeatureSample>,
     /// What the film keeps of the surface.
     surface: Option<SurfaceSample>,
-    /// How much of what is behind it covers, where that is neither all nor said by what it caught.
+    /// Its coverage, if not full and not given by `caught`.
     covered: Option<Spectrum>,
 }
 
-/// Where on the film a sample is taken, and through which point of the lens.
+/// The film point, lens point and time of a sample.
 #[derive(Clone, Copy)]
 struct Aim {
     /// The point of the film, in pixels.
     film: DVec2,
     lens: DVec2,
-    /// When it looks.
     time: f64,
     weight: f64,
 }
@@ -107,7 +107,7 @@ impl<'a> PixelSampler<'a> {
         })
     }
 
-    /// Takes samples, and hands them on in their order.
+    /// Takes samples, and passes each to `put`, in order.
     pub(crate) fn take(
         &self,
         wave: &mut Wave<'a>,
@@ -116,7 +116,7 @@ impl<'a> PixelSampler<'a> {
         mut put: impl FnMut(SampleId, Sample),
     ) {
         let mut primary_hits = self.start(wave, ids);
-        // Of the filter and of the lens.
+        // The weights of the filter and of the lens.
         let mut weights = Vec::with_capacity(ids.len());
         match &self.pinhole {
             Some(pinhole) => {
@@ -163,7 +163,7 @@ impl<'a> PixelSampler<'a> {
         }
     }
 
-    /// What a film with buckets keeps of a sample. What ground shows that catches shadows is a colour, which a smooth spectrum stands for.
+    /// The sample of a film with buckets. A shadow catcher has an RGB colour, which becomes a smooth spectrum.
     fn spectrum(
         &self,
         wavelengths: Option<&Wavelengths>,
@@ -176,8 +176,8 @@ impl<'a> PixelSampler<'a> {
         Some(SpectralSample { nm: wavelengths.nm(), radiance: through_lens(radiance, passes).to_array() })
     }
 
-    /// Has the integrator find the light of all sights but those that see something else, and gives what these see and all features;
-    /// nothing where no sample has any of both.
+    /// Computes features and shadow catchers, then calls the integrator for the other samples. The result is empty if
+    /// no sample has either.
     fn see(&self, primary_hits: &mut PrimaryHits<'_, 'a>, record: &mut Record) -> Vec<SeenSample> {
         primary_hits.show_background(self.lights_are_seen);
         let has_catcher = self.scene.ground().is_some_and(|ground| ground.catcher);
@@ -233,7 +233,7 @@ impl<'a> PixelSampler<'a> {
                 let left = self.left_by_media(&primary_hit, &numbers);
                 let features = features.map(|features| feature_sample(features.behind(left)));
                 if primary_hit.met.is_none() && left != Spectrum::WHITE && !self.lights_are_seen {
-                    // What is seen is the medium alone.
+                    // Only the medium is visible.
                     seen[slot] =
                         SeenSample { caught: None, features, surface, covered: Some(Spectrum::WHITE - left) };
                     return true;
@@ -254,7 +254,7 @@ impl<'a> PixelSampler<'a> {
         seen
     }
 
-    /// An estimate of what media leave of the light of what a camera sees.
+    /// An estimate of the transmittance of media along a camera ray.
     fn left_by_media(&self, primary_hit: &PrimaryHit<'_>, numbers: &SampleNumbers) -> Spectrum {
         if !self.scene.has_media() {
             return Spectrum::WHITE;
@@ -265,12 +265,13 @@ impl<'a> PixelSampler<'a> {
         self.scene.transmittance(self.view.medium(), &ray.with_range(0.0, end), numbers.along(&ray), None)
     }
 
-    /// Takes up samples.
+    /// Starts samples.
     fn start<'w>(&'w self, wave: &'w mut Wave<'a>, ids: &[SampleId]) -> PrimaryHits<'w, 'a> {
         PrimaryHits::start(self.scene, &self.view, wave, self.precision, &self.sampler, ids, self.wavelengths)
     }
 
-    /// Where a sample looks, by the numbers of [`SampleNumbers::aim`]. A lens without width has no point but its middle.
+    /// The aim of a sample, by the numbers of [`SampleNumbers::aim`]. Without lens numbers, it goes through the centre
+    /// of the lens.
     fn aim(&self, id: SampleId, [u, v, part, _]: [f32; 4], numbers: Option<&SampleNumbers>) -> Aim {
         let place = self.filter.sample(DVec2::new(u.into(), v.into()));
         let pixel = DVec2::new(f64::from(id.x) + 0.5, f64::from(id.y) + 0.5);
@@ -288,7 +289,7 @@ impl<'a> PixelSampler<'a> {
         }
     }
 
-    /// A sample with all that leads to it.
+    /// A sample with its events.
     fn explain(&self, id: SampleId) -> ExplainedSample {
         let numbers = self.sampler.numbers(id.x, id.y, id.index);
         let aim = self.aim(id, numbers.aim(), Some(&numbers));
@@ -298,7 +299,7 @@ impl<'a> PixelSampler<'a> {
         ExplainedSample { film: aim.film, lens: aim.lens, ray, radiance, weight: aim.weight, events }
     }
 
-    /// The light along a ray with the numbers of a sample, and what happens along its path.
+    /// The radiance along a camera ray with the numbers of a sample, and the events of its path.
     fn explain_camera_ray(&self, id: SampleId, camera: &CameraRay) -> (Ray, Spectrum, Vec<Event>) {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
         let mut primary_hits = self.start(&mut wave, &[id]);
@@ -311,20 +312,21 @@ impl<'a> PixelSampler<'a> {
     }
 }
 
-/// What a picture has of radiance along a camera's ray of this weight.
+/// Radiance times the weight of its camera ray.
 fn through_lens(radiance: Spectrum, weight: f64) -> Spectrum {
     if weight == 1.0 {
         radiance
     } else if weight == 0.0 {
-        // Whatever is behind what the lens stops.
+        // Black also if the radiance behind the stop is not finite.
         Spectrum::BLACK
     } else {
         radiance * weight as f32
     }
 }
 
-/// Rays that are rounded leave surfaces from farther off. Where that would show, because a small part of a large scene is looked at,
-/// they are not: where it is more than a pixel of a picture of a thousand, of anything that some rays over the picture meet.
+/// Rounded rays start farther off their surfaces. In a close-up of a large scene that would show, so rays are in double
+/// precision if, at the hit of any of a few rays over the picture, the rounding is larger than a pixel of a picture
+/// that is 1000 pixels wide.
 fn precision(scene: &Scene, view: &View, options: &RenderOptions) -> Precision {
     const RAYS: u32 = 8;
     const PIXELS: f64 = 1000.0;
@@ -342,7 +344,7 @@ fn precision(scene: &Scene, view: &View, options: &RenderOptions) -> Precision {
     Precision::of(scene, (0..RAYS * RAYS).any(is_coarse))
 }
 
-/// What a film keeps of a surface.
+/// The point of a surface for a film of features.
 fn surface_point(met: &Interaction<'_>) -> SurfacePoint {
     let (shading_normal, albedo) = match met.scattering() {
         Some((frame, bsdf)) => (frame.n, bsdf.albedo()),
@@ -366,7 +368,7 @@ fn feature_sample(features: Features) -> FeatureSample {
     }
 }
 
-/// A sample of a pixel with all that led to it.
+/// A sample of a pixel with its events.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ExplainedSample {
@@ -378,13 +380,13 @@ pub struct ExplainedSample {
     pub ray: Ray,
     /// The radiance that the render adds to the pixel for this sample, before the film's own factor.
     pub radiance: Spectrum,
-    /// The weight that it has in the pixel.
+    /// Its weight in the pixel.
     pub weight: f64,
-    /// What happens along the path, in order.
+    /// The events of its path, in order.
     pub events: Vec<Event>,
 }
 
-/// The sample of a pixel with this number, as [`crate::render()`] takes it, with all that happens along its path.
+/// The sample of a pixel with this index, as [`crate::render()`] takes it, with the events of its path.
 ///
 /// # Errors
 /// [`RenderError`] for options that make no picture; the pixel need not be in the crop.
@@ -399,8 +401,8 @@ pub fn explain_sample(
     Ok(pixel_sampler.explain(SampleId { x, y, index }))
 }
 
-/// An estimate of the light that arrives along a ray, as the render would make it, with all that happens along its path. The number
-/// chooses among such estimates. The direction must be unit.
+/// An estimate of the radiance that arrives along a ray, computed as the render would, with the events of its path. The
+/// index selects the random numbers. The direction must be unit.
 ///
 /// # Errors
 /// [`RenderError`] for options that make no picture.
@@ -413,7 +415,7 @@ pub fn explain_ray(
     let integrator = integrator(&options.integrator);
     let pixel_sampler = PixelSampler::new(scene, options, &*integrator)?;
     let camera = CameraRay { ray: *ray, footprint: Footprint::Point, weight: 1.0 };
-    // With the random numbers of a pixel.
+    // The random numbers are those of a pixel.
     let (_, radiance, events) = pixel_sampler.explain_camera_ray(SampleId { x: 0, y: 0, index }, &camera);
     Ok((radiance, events))
 }

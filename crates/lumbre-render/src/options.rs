@@ -20,7 +20,7 @@ use crate::workers::Workers;
 
 /// Everything about a picture that is not in the scene.
 ///
-/// [`RenderOptions::of`] has what the scene's own description says; [`RenderOptions::default`] asks no scene: 1280 by 720 pixels of
+/// [`RenderOptions::of`] takes them from the scene's description. [`RenderOptions::default`] is 1280 by 720 pixels of
 /// 64 samples, path traced.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -29,43 +29,42 @@ pub struct RenderOptions {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Which of them to render; the others are not in the result.
+    /// The pixels to render; the others are not in the result.
     pub crop: Option<PixelBounds>,
     /// Position of the camera among those of the scene.
     pub camera: usize,
-    /// A camera in place of that one. Pictures of one scene from many places build nothing anew.
+    /// A camera instead of that one. Pictures of a scene from many places need no rebuild.
     pub view: Option<Camera>,
     /// The integrator.
     pub integrator: IntegratorDesc,
-    /// The sampler; its `spp` is not looked at.
+    /// The sampler; its `spp` is ignored.
     pub sampler: SamplerDesc,
     /// The pixel filter.
     pub filter: FilterDesc,
-    /// What is kept of samples. Films that keep wavelengths need [`Self::spectral`].
+    /// The film. Films that keep wavelengths need [`Self::spectral`].
     pub film: FilmKind,
     /// Factor from radiance to pixel values, and the limit of a sample.
     pub exposure: Exposure,
-    /// Whether what the camera sees where there is nothing is left out: the picture then says how much each pixel covers.
-    /// Lights at infinity still light what there is.
+    /// Whether the background is transparent: the picture then has alpha. Lights at infinity still light the scene.
     pub transparent: bool,
-    /// Whether samples carry wavelengths in place of linear Rec. 709: see [`Wavelengths`](lumbre_shading::spectrum::Wavelengths). Only the
-    /// path integrator does.
+    /// Whether samples carry wavelengths instead of linear Rec. 709: see
+    /// [`Wavelengths`](lumbre_shading::spectrum::Wavelengths). Only the path integrator does.
     pub spectral: bool,
-    /// The camera whose sensor a spectral render has, in place of that of the exposure.
+    /// The sensor of a spectral render, instead of that of the exposure.
     pub sensor_curves: Option<Arc<SensorCurves>>,
     /// When to stop.
     pub stop: Stop,
-    /// The index of the first sample of every pixel: parts of a render begin where others end.
+    /// The index of the first sample of every pixel, for parts of a render.
     pub first_sample: u32,
-    /// Whether to gather albedo, normals, depth and uv too.
+    /// Whether to render albedo, normals, depth and uv too.
     pub features: bool,
-    /// Whether to gather what [`crate::denoise`] needs. The picture is the same.
+    /// Whether to gather the guides of [`crate::denoise`]. The picture is the same.
     pub guides: bool,
-    /// Threads; 0 for one a core.
+    /// Threads; 0 for one per core.
     pub threads: usize,
 }
 
-/// When a render has done enough: at whichever comes first.
+/// When a render stops: at the limit that comes first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Stop {
@@ -73,27 +72,28 @@ pub struct Stop {
     pub spp: u32,
     /// After this much time.
     pub time: Option<Duration>,
-    /// For each pixel, when its noise is estimated to be below this: the standard error of its luminance, divided by luminance
-    /// (plus a tenth of the mean of a small picture, so that black pixels do not count for much). A pixel is looked at when it has
-    /// [`Stop::min_spp`] samples, and then at 16, 24, 32, 48, 64 samples and so on; what it finds depends on its own samples and those of
-    /// the small picture alone, which is taken first. The noise of a picture is the root mean square of that of its pixels.
+    /// For each pixel, when its noise is estimated to be below this: the standard error of its luminance, divided by
+    /// luminance (plus a tenth of the mean of a small picture, so that black pixels do not count for much). A pixel is
+    /// checked when it has [`Stop::min_spp`] samples, and then at 16, 24, 32, 48, 64 samples and so on. The result
+    /// depends only on its own samples and on those of the small picture, which is taken first. The noise of a picture
+    /// is the root mean square of that of its pixels.
     pub noise: Option<f64>,
-    /// The samples that every pixel has before its noise may end it. By default 16, or up to 256 where the small picture finds
-    /// that much of the light comes by rare samples.
+    /// Minimum samples per pixel before its noise is checked. By default 16, or up to 256 if the small picture finds
+    /// that much of the light is in rare samples.
     pub min_spp: Option<u32>,
 }
 
-/// Samples a pixel, where nobody says how many.
+/// Default samples per pixel.
 const DEFAULT_SPP: u32 = 64;
-/// Four samples whose mean is less certain than this, as a share, see an edge.
+/// If the mean of four samples is less certain than this, as a share, the pixel sees an edge.
 const EDGE_NOISE: f64 = 0.05;
-/// Pixels across and down, where nobody says how many.
+/// Default width and height in pixels.
 const DEFAULT_SIZE: (u32, u32) = (1280, 720);
 const MAX_SIDE: u32 = 65_536;
 
 impl Stop {
-    /// The most samples per pixel of a render to a noise, where no one says how many: as many as it takes. A sum of samples holds sixteen
-    /// times as many.
+    /// The most samples per pixel of a render to a noise, without a limit given. A sum of samples can hold sixteen
+    /// times this number.
     pub const MAX_FOR_NOISE: u32 = 1 << 20;
 
     /// At this many samples a pixel.
@@ -112,7 +112,7 @@ impl Stop {
     }
 }
 
-/// How a film is exposed.
+/// The exposure of a film.
 fn exposure_of(film: &FilmDesc) -> Exposure {
     Exposure { factor: film.exposure, max_component: film.max_component, sensor: film.sensor }
 }
@@ -145,7 +145,7 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// What the description of the scene asks for; 1280 by 720 pixels of 64 samples where it does not say.
+    /// The options of the scene's description; by default 1280 by 720 pixels of 64 samples.
     pub fn of(scene: &Scene) -> Self {
         let film = scene.film();
         let (width, height) = (film.width.unwrap_or(DEFAULT_SIZE.0), film.height.unwrap_or(DEFAULT_SIZE.1));
@@ -185,7 +185,8 @@ impl RenderOptions {
         self
     }
 
-    /// The camera of a picture of this scene: [`RenderOptions::view`], or else the scene's own at [`RenderOptions::camera`].
+    /// The camera of a picture of this scene: [`RenderOptions::view`], or else the scene's own at
+    /// [`RenderOptions::camera`].
     ///
     /// # Errors
     /// [`RenderError::NoSuchCamera`], and [`RenderError::Camera`] for a view that makes no picture.
@@ -198,7 +199,7 @@ impl RenderOptions {
         cameras.get(self.camera).ok_or(RenderError::NoSuchCamera { index: self.camera, count: cameras.len() })
     }
 
-    /// Another size, of which the film's crop keeps its share.
+    /// Another size; the film's crop keeps its share of it.
     pub fn resize(&mut self, film: &FilmDesc, width: u32, height: u32) {
         let before = (f64::from(self.width), f64::from(self.height));
         (self.width, self.height) = (width, height);
@@ -248,9 +249,9 @@ impl RenderOptions {
         }
     }
 
-    /// Bytes that a render with these options holds besides the scene: the sums of every pixel, and the pictures made of them. Not
-    /// counted is what most pictures have little of: coverage by colour, where shadows are coloured, and twofold sums of a denoiser,
-    /// where a tile shows both ground that catches shadows and other things.
+    /// Bytes that a render with these options needs besides the scene: the sums of every pixel, and the pictures made
+    /// of them. Small parts are not counted: coverage by channel, for coloured shadows, and twofold sums of a denoiser,
+    /// for tiles that show both a shadow catcher and other things.
     ///
     /// # Errors
     /// As for [`RenderOptions::bounds`].
@@ -282,7 +283,7 @@ impl RenderOptions {
         Ok(all.saturating_add(photons))
     }
 
-    /// How many channels the film has besides red, green and blue.
+    /// Number of channels of the film besides red, green and blue.
     pub fn film_channels(&self) -> usize {
         match self.film {
             FilmKind::Rgb => 0,

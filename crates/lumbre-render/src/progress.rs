@@ -1,35 +1,34 @@
-//! What a render tells while it runs.
+//! Progress of a render.
 
 use std::time::Duration;
 
 use lumbre_image::Image;
 
-/// Observes how far a render is. It never changes the picture.
+/// Observes the progress of a render. It never changes the picture.
 pub trait Progress: Sync {
-    /// Told now and then, from whichever thread, never from two at once.
+    /// Called at intervals, from any thread, never from two at once.
     fn state(&self, _state: &State) {}
 
-    /// Told after each pass over the picture, from one thread; the next pass waits for it.
+    /// Called after each pass over the picture, from one thread; the next pass waits for it.
     fn pass(&self, _snapshot: &Snapshot<'_>) {}
 
-    /// Asked once, from one thread, when no more samples will be taken: whether anyone still wants the picture. Where no one does, it is
-    /// not put together, and the render ends at once with [`crate::RenderError::Unwanted`].
+    /// Called once, from one thread, when no more samples will be taken: whether the picture is still wanted. If not,
+    /// it is not assembled, and the render ends at once with [`crate::RenderError::Unwanted`].
     fn is_wanted(&self) -> bool {
         true
     }
 
-    /// Told once, from one thread, when no more samples will be taken and the picture is put together: what
-    /// [`crate::Stats::stride`] will be.
+    /// Called once, from one thread, before the picture is assembled, with its [`crate::Stats::stride`].
     fn stopped(&self, _stride: Option<u32>) {}
 }
 
-/// Nobody.
+/// No observer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoProgress;
 
 impl Progress for NoProgress {}
 
-/// How far a render is.
+/// The progress of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct State {
@@ -37,20 +36,20 @@ pub struct State {
     pub samples: u64,
     /// Rays traced by this run.
     pub rays: u64,
-    /// Samples over all pixels at the end: exact where their number ends the render, else estimated from the time or the noise that
-    /// does; `None` as long as nothing is known.
+    /// Final samples over all pixels: exact if their number ends the render, else estimated from the time or noise
+    /// limit; `None` if unknown.
     pub total: Option<u64>,
-    /// How much of the way to its end the render has gone, in [0, 1], whichever of its limits comes first.
+    /// The fraction done, in [0, 1], by the limit that comes first.
     pub share: f64,
-    /// Since the start.
+    /// Time since the start.
     pub elapsed: Duration,
-    /// Until the end, if the rest goes as fast; `None` before anything is known.
+    /// Estimated time left; `None` if unknown.
     pub left: Option<Duration>,
 }
 
 /// The picture after a pass.
 pub struct Snapshot<'a> {
-    /// Samples of every pixel; where noise ends their sampling, of those that it has not ended.
+    /// Samples of every pixel; with a noise target, of the pixels that have not reached it.
     pub spp: u32,
     /// The noise, as [`crate::Stop::noise`] defines it; `None` before there are two samples.
     pub noise: Option<f64>,
@@ -58,7 +57,7 @@ pub struct Snapshot<'a> {
 }
 
 impl Snapshot<'_> {
-    /// The picture so far. It is put together when asked for.
+    /// Assembles the picture so far.
     pub fn image(&self) -> Image {
         (self.picture)()
     }

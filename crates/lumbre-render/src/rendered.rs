@@ -1,4 +1,4 @@
-//! A picture, and what it took.
+//! A rendered picture, with statistics.
 
 use std::time::Duration;
 
@@ -9,69 +9,69 @@ use crate::film::{
 };
 use crate::transport::{Feature, RayCounts};
 
-/// What [`crate::render`] returns: all that was asked for, or what there was when it was stopped.
+/// The result of [`crate::render`]: complete, or as far as it was when it was stopped.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Rendered {
-    /// The pixels of [`Rendered::bounds`]; black where no sample was taken (see [`Stats::stride`]). With coverage, by which its colours are
-    /// multiplied, if the options ask for a transparent picture.
+    /// The pixels of [`Rendered::bounds`]; black where no sample was taken (see [`Stats::stride`]). Transparent
+    /// pictures have alpha, premultiplied.
     pub image: Image,
-    /// Coverage by colour, of which that of the image is the mean: where a transparent picture has coloured shadows on its
-    /// ground. `None` where it is that of all colours alike.
+    /// Coverage by channel, if a transparent picture has coloured shadows on its ground; the image has its mean. `None`
+    /// if it is the same for all channels.
     pub coverage: Option<Image>,
-    /// Which pixels of the whole picture.
+    /// The pixels of the whole picture that were rendered.
     pub bounds: PixelBounds,
-    /// Feature images, if they were asked for: albedo, normal (with signs), depth, uv (in red and green).
+    /// Feature images, if requested: albedo, normal (with signs), depth, uv (in red and green).
     pub features: Vec<(Feature, Image)>,
-    /// What the denoiser needs of every pixel, if it was asked for.
+    /// The denoiser's guides of every pixel, if requested.
     pub guides: Option<Guides>,
-    /// What the film has besides colours.
+    /// Further layers of the film.
     pub film: FilmLayers,
-    /// What it took.
+    /// Statistics.
     pub stats: Stats,
 }
 
-/// What a film keeps besides colours, as an EXR file has it; nothing for a film `rgb`.
+/// The layers of a film besides colours, as in an EXR file; empty for a film `rgb`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FilmLayers {
     /// Channels by the names that pbrt-v4 gives them.
     pub layers: Vec<Layer>,
-    /// What the file says of them, by name.
+    /// Attributes of the file, by name.
     pub attributes: Vec<(String, String)>,
 }
 
-/// What a render took.
+/// Statistics of a render.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Stats {
     /// Samples that every pixel has.
     pub spp: u32,
-    /// Samples of the pixel with the most: more than the others have where the noise of each pixel ends its sampling.
+    /// The most samples of any pixel: more than [`Self::spp`] in a render to a noise target.
     pub most_spp: u32,
-    /// The side of squares of pixels of which each has a sample, which all pixels of the square show that have none of their own: 1
-    /// where every pixel has a sample. `None` where there is no whole picture, not even such a coarse one.
+    /// The side of squares of pixels that have at least one sample each: 1 if every pixel has a sample. Pixels without
+    /// a sample show that of their square. `None` if there is not even such a coarse picture.
     pub stride: Option<u32>,
-    /// Whether someone asked it to stop before it had all samples.
+    /// Whether it was cancelled before it had all samples.
     pub cancelled: bool,
     /// Paths, over all pixels.
     pub samples: u64,
     /// Rays.
     pub rays: RayCounts,
-    /// Samples that were not finite, and are not in the picture.
+    /// Samples that were not finite and were dropped.
     pub dropped: u64,
-    /// Samples that were brighter than [`Stats::MAX_SAMPLE`], and are in the picture as bright as that.
+    /// Samples that were brighter than [`Stats::MAX_SAMPLE`] and were clamped to it.
     pub clamped: u64,
-    /// The first of those that were dropped.
+    /// The first dropped samples.
     pub first_dropped: Vec<DroppedSample>,
     /// The noise, as [`crate::Stop::noise`] defines it; `None` for fewer than two samples a pixel.
     pub noise: Option<f64>,
-    /// The noise that was asked for.
+    /// The requested noise.
     pub noise_target: Option<f64>,
-    /// Pixels whose sampling was to end at that noise, and ended before.
+    /// Pixels that did not reach the requested noise.
     pub noisy_pixels: u64,
     /// Threads.
     pub threads: usize,
-    /// More threads that were asked for, and that the system refused.
+    /// Requested threads that the system refused.
     pub refused_threads: usize,
     /// Time.
     pub elapsed: Duration,
@@ -91,15 +91,15 @@ impl Rendered {
 }
 
 impl Stats {
-    /// The most that a sample counts for: see [`Stats::clamped`].
+    /// The largest value of a sample: see [`Stats::clamped`].
     pub const MAX_SAMPLE: f64 = MAX_SAMPLE;
 
-    /// Whether a noise was asked for, and that of the picture is above it, or not known.
+    /// Whether the noise is above the requested one, or unknown; false without a request.
     pub fn misses_noise_target(&self) -> bool {
         self.noise_target.is_some_and(|target| self.noise.is_none_or(|noise| noise > target))
     }
 
-    /// Paths in a second.
+    /// Paths per second.
     pub fn paths_per_second(&self) -> f64 {
         let seconds = self.elapsed.as_secs_f64();
         if seconds > 0.0 { self.samples as f64 / seconds } else { 0.0 }
@@ -117,15 +117,14 @@ pub struct DroppedSample {
     pub sample: u32,
 }
 
-/// The pictures of some tiles, with statistics that say nothing yet.
+/// The pictures of some tiles, without statistics.
 pub(crate) fn rendered_of<'t>(
     tiles: impl Iterator<Item = &'t Tile> + Clone,
     bounds: PixelBounds,
     transparent: bool,
     extras: Extras,
 ) -> Rendered {
-    let wanted: &[Feature] =
-        if extras.features { &[Feature::Albedo, Feature::Normal, Feature::Depth, Feature::Uv] } else { &[] };
+    let wanted: &[Feature] = if extras.features { &Feature::ALL } else { &[] };
     Rendered {
         image: picture(tiles.clone(), bounds, transparent),
         coverage: coverage_picture(tiles.clone(), bounds),
@@ -137,7 +136,7 @@ pub(crate) fn rendered_of<'t>(
     }
 }
 
-/// The picture of some tiles, with coverage if it is to be transparent.
+/// The picture of some tiles, with alpha if it is transparent.
 pub(crate) fn picture<'t>(
     tiles: impl Iterator<Item = &'t Tile> + Clone,
     bounds: PixelBounds,
@@ -153,7 +152,7 @@ pub(crate) fn picture<'t>(
     image.with_alpha(alpha).expect("a value for each pixel")
 }
 
-/// The coverage of some tiles by colour; `None` where it is that of all colours alike.
+/// The coverage of some tiles by channel; `None` if it is the same for all channels.
 pub(crate) fn coverage_picture<'t>(
     tiles: impl Iterator<Item = &'t Tile> + Clone,
     bounds: PixelBounds,
@@ -181,7 +180,7 @@ pub(crate) fn feature_picture<'t>(
     image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, colours))
 }
 
-/// What a film of this kind has besides colours.
+/// The further layers of a film.
 fn film_layers<'t>(
     tiles: impl Iterator<Item = &'t Tile> + Clone,
     bounds: PixelBounds,
@@ -214,7 +213,7 @@ fn film_layers<'t>(
     FilmLayers { layers, attributes }
 }
 
-/// The variance of the luminance of every pixel, as it is estimated from its samples: that of their mean. 0 for fewer than two.
+/// The variance of the mean luminance of every pixel, estimated from its samples; 0 for fewer than two.
 pub(crate) fn variance_picture<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds: PixelBounds) -> Image {
     let variance = |pixel: &Pixel| pixel.luminance_with_error().map_or(0.0, |(_, error)| error * error);
     let variances =
@@ -222,7 +221,7 @@ pub(crate) fn variance_picture<'t>(tiles: impl Iterator<Item = &'t Tile>, bounds
     image_of(bounds, put_together(tiles, bounds, Rgb::BLACK, variances))
 }
 
-/// The values of all pixels, row by row, from those of tiles; `none` where there is no tile.
+/// The values of all pixels, row by row, from those of tiles; `none` for pixels outside all tiles.
 pub(crate) fn put_together<'t, T: Copy, I: Iterator<Item = T>>(
     tiles: impl Iterator<Item = &'t Tile>,
     bounds: PixelBounds,

@@ -17,34 +17,35 @@ const SIDE: f64 = 64.0;
 /// Samples of each of its pixels, at first and at most.
 const SPP: u32 = 64;
 const MAX_SPP: u32 = 1 << 14;
-/// It is continued until it has this share of the samples that the picture will take, by what it has found so far: what is left unseen is
-/// rare even among the samples of the picture.
+/// It runs until it has this share of the samples that it predicts for the picture. Light that it still misses is rare
+/// even among the samples of the picture.
 const SHARE: f64 = 1.0 / 32.0;
-/// The share of the time of a render that it may take to be continued.
+/// The trial is not continued after one part in this many of the time limit.
 const SHARE_OF_TIME: u32 = 8;
-/// A pixel may end when it has this share of the samples in which rare light is to be expected once.
+/// A pixel may end when it has this share of the samples among which one of rare light is expected.
 const HARDNESS: f64 = 0.25;
-/// The fewest samples of a pixel before its noise is looked at.
+/// Minimum samples of a pixel before its noise is checked.
 const MIN_SPP: u32 = 16;
-/// And the fewest in a hard scene.
+/// The same for a hard scene.
 const MAX_MIN_SPP: u32 = 256;
 
-/// The mean luminance of the picture, and what to expect of the samples of each pixel. A function of scene and options, the same for
-/// every crop and any number of threads.
+/// The mean luminance of the picture, and the expected statistics of the samples of each pixel. It depends on scene and
+/// options only, not on crops and threads.
 #[derive(Clone, Debug)]
 pub(crate) struct Trial {
     pub(crate) mean: f64,
     neighbourhoods: Neighbourhoods,
 }
 
-/// A row of the picture.
+/// A row of the trial picture.
 struct Row {
     y: u32,
     pixels: Vec<Moments>,
 }
 
 impl Trial {
-    /// Takes it for a limit of noise. It is not continued in the last part of the time until `deadline`.
+    /// Takes the trial for a noise target. It is not continued after an eighth of the time until `deadline`, and stops
+    /// after half of it.
     pub(crate) fn take(
         scene: &Scene,
         options: &RenderOptions,
@@ -56,7 +57,7 @@ impl Trial {
     ) -> Result<Self, RenderError> {
         let longer_side = SIDE.min(f64::from(options.width.max(options.height)));
         let film = match options.film {
-            // Its noise is that of its wavelengths.
+            // Spectral noise includes that of the wavelengths.
             FilmKind::Spectral(_) => options.film,
             FilmKind::Rgb | FilmKind::GBuffer(_) => FilmKind::Rgb,
         };
@@ -108,7 +109,7 @@ impl Trial {
         Self { mean: whole.expectation().mean, neighbourhoods: Neighbourhoods::new(size, width, spreads) }
     }
 
-    /// The samples that the whole picture will take.
+    /// The predicted samples of the whole picture.
     fn cost(&self, limit: f64, options: &RenderOptions) -> f64 {
         let floor = FLOOR * self.mean.max(0.0);
         let cells = self.neighbourhoods.all();
@@ -119,13 +120,13 @@ impl Trial {
         mean * f64::from(options.width) * f64::from(options.height)
     }
 
-    /// What to expect of the samples of a pixel.
+    /// The expected statistics of the samples of a pixel.
     pub(crate) fn at(&self, x: u32, y: u32) -> Expectation {
         self.neighbourhoods.at(x, y)
     }
 
-    /// How many samples every pixel gets before its noise may end it, where no one says: more where rare light is to be expected in most
-    /// of the picture.
+    /// The default minimum of samples per pixel before its noise is checked: more if rare light is expected in most of
+    /// the picture.
     pub(crate) fn min_spp(&self) -> u32 {
         let mut kurtoses: Vec<f64> = self.neighbourhoods.all().iter().map(|cell| cell.kurtosis).collect();
         let middle = kurtoses.len() / 2;
@@ -139,7 +140,7 @@ impl Trial {
 mod tests {
     use super::*;
 
-    /// A trial of 8 by 6 pixels of 64 samples, of which one in `rarity` is bright.
+    /// A trial of 8 by 6 pixels of 64 samples; one in `rarity` is bright.
     fn trial(rarity: usize) -> Trial {
         let spread = |pixel: usize| {
             let mut moments = Moments::default();

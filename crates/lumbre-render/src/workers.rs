@@ -2,18 +2,18 @@
 
 use rayon::prelude::*;
 
-/// As many threads as asked for, or as the system grants.
+/// The requested threads, or as many as the system grants.
 pub(crate) struct Workers {
-    /// `None` where it grants none: the calling thread does the work.
+    /// `None` if it grants none: the calling thread does the work.
     pool: Option<rayon::ThreadPool>,
     refused: usize,
 }
 
 impl Workers {
-    /// This many threads; 0 for one a core.
+    /// This many threads; 0 for one per core.
     pub(crate) fn start(threads: usize) -> Self {
         let wanted = Self::wanted(threads);
-        // The first try lets rayon look at its environment, too.
+        // The first try lets rayon read its environment variables, too.
         let mut count = threads;
         loop {
             match rayon::ThreadPoolBuilder::new().num_threads(count).build() {
@@ -27,7 +27,7 @@ impl Workers {
         }
     }
 
-    /// How many are asked for: 0 is one a core.
+    /// The requested number; 0 is one per core.
     pub(crate) fn wanted(threads: usize) -> usize {
         match threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
@@ -35,17 +35,17 @@ impl Workers {
         }
     }
 
-    /// How many there are.
+    /// Number of threads.
     pub(crate) fn count(&self) -> usize {
         self.pool.as_ref().map_or(1, rayon::ThreadPool::current_num_threads)
     }
 
-    /// How many more were asked for.
+    /// Number of threads that the system refused.
     pub(crate) fn refused(&self) -> usize {
         self.refused
     }
 
-    /// Does a piece of work for each item.
+    /// Does work for each item, in parallel.
     pub(crate) fn for_each<T: Send>(&self, items: &mut [T], work: impl Fn(&mut T) + Send + Sync) {
         match &self.pool {
             Some(pool) => pool.install(|| items.par_iter_mut().for_each(work)),

@@ -156,7 +156,7 @@ fn what_paths_find_in_fog_photons_and_paths_find_together() {
 fn a_lamp_in_a_glass_ball_lights_fog_undimmed() {
     let at = DVec3::new(0.3, 0.1, 2.0);
     let mut bare = in_fog(floor(vec![lamp(at)]));
-    // The fog alone scatters: the floor is black. The lamp is beside the picture.
+    // The fog alone scatters: the floor is black. The lamp is outside the picture.
     bare.materials[0].material = Arc::new(diffuse(0.0));
     let beside = look(DVec3::new(3.0, 1.0, 3.0), DVec3::new(0.0, -2.0, 1.0), 40.0);
     bare.cameras[0] = Camera { medium: Some(MediumId(0)), ..beside };

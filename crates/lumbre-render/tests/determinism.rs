@@ -149,8 +149,8 @@ fn a_scene_far_from_the_origin_looks_the_same() {
         let offset = distance * DVec3::new(1.0, -1.0, 0.75);
         let far = Scene::build(still_life(offset)).unwrap();
         let image = picture(&far, &options(&far, 60, 40, 16)).image;
-        // What rounding of the input to 1e-10 may change is which side of an edge a sample falls on, and the last bit of a direction in
-        // single precision, by which walks through coats and mixtures are keyed.
+        // What rounding of the input to 1e-10 may change is which side of an edge a sample falls on, and the last bit
+        // of a direction in single precision, by which walks through coats and mixtures are keyed.
         let differs = |a: &Rgb, b: &Rgb| (a.g - b.g).abs() > 1e-3 * (a.g + b.g);
         let changed = reference.pixels().iter().zip(image.pixels()).filter(|(a, b)| differs(a, b)).count();
         assert!(changed <= 240, "{distance}: {changed} of 2400 pixels");
@@ -223,7 +223,7 @@ fn too_bright_samples_are_clamped_and_counted() {
     assert!(rendered.image.pixels().iter().all(|&c| c == Rgb::splat(most)));
 }
 
-/// Cancels after a number of passes, and writes down what it is told.
+/// Cancels after a number of passes, and records its calls.
 struct Impatient {
     cancel: CancelToken,
     after_spp: u32,
@@ -404,7 +404,7 @@ fn instanced_lights_are_as_bright_as_plain_ones() {
     assert_close(light(&nested), light(&plain), 0.02, "nested");
 }
 
-/// White, of which the render is cancelled after this many samples.
+/// White; cancels the render after this many samples.
 #[derive(Debug)]
 struct Interrupting {
     cancel: CancelToken,

@@ -1,4 +1,5 @@
-//! Direct light on a diffuse floor against closed forms, to 0.2 %, and the two ways of finding light against each other.
+//! Direct light on a diffuse floor against closed forms, to 0.2 %, and the two ways of finding light against each
+//! other.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 

@@ -53,8 +53,8 @@ struct Way {
     share: f64,
 }
 
-/// The mean of the picture is 1 however light is found, by paths without roulette. Each way takes as many samples a pixel as its
-/// noise asks for; lights alone are noisy where they are near, and so is the tolerance.
+/// The mean of the picture is 1 however light is found, by paths without roulette. Each way takes the samples per pixel
+/// that its noise asks for; lights alone are noisy where they are near, and so is the tolerance.
 fn assert_white(desc: SceneDesc, what: &str, ways: &[Way]) {
     let scene = Scene::build(desc).unwrap();
     for &Way { strategy, spp, bounces, share } in ways {
@@ -69,12 +69,12 @@ fn assert_white(desc: SceneDesc, what: &str, ways: &[Way]) {
     }
 }
 
-// Rooms keep a half or a quarter of the light at every wall: after twenty-four bounces 10⁻⁷ of it in one that is empty, and about
-// 10⁻⁴ around a ring of thin glass.
+// Rooms keep a half or a quarter of the light at every wall: after twenty-four bounces 10⁻⁷ of it in one that is empty,
+// and about 10⁻⁴ around a ring of thin glass.
 const BOTH: Way = Way { strategy: Strategy::Both, spp: 320, bounces: 24, share: 2e-3 };
 /// Without diffuse light there is less noise.
 const QUIET: Way = Way { spp: 64, ..BOTH };
-/// Rough solids are noisy: with ten times as many samples they too are within 0.1 %. And light stays within them for long.
+/// Rough solids are noisy: with ten times the samples they too are within 0.1 %. And light stays within them for long.
 const LAYERED: Way = Way { spp: 96, bounces: 40, share: 6e-3, ..BOTH };
 const LIGHTS: Way = Way { strategy: Strategy::Lights, spp: 48, share: 2.5e-2, ..BOTH };
 const BSDF: Way = Way { strategy: Strategy::Bsdf, spp: 24, ..BOTH };
@@ -150,7 +150,8 @@ fn a_lossless_uber_vanishes_in_a_white_room() {
     assert!(seen > 0);
 }
 
-/// In how many shapes it was not seen. Every material is in one of the rooms, and in all of them by `cargo xtask test --all`.
+/// In how many shapes it was not seen. Every material is in one of the rooms, and in all of them by `cargo xtask
+/// test --all`.
 fn assert_not_seen(number: usize, name: &str, material: &Material, is_layered: bool) -> usize {
     let mut seen = 0;
     for (i, (room_name, walls, middle)) in rooms().into_iter().enumerate() {

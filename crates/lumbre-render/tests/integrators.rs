@@ -82,7 +82,7 @@ fn whitted_follows_mirrors_without_a_second_bounce() {
     };
     assert_close(show(desc.clone(), 5), expected, 1e-4, "reflected");
     assert_eq!(show(desc.clone(), 1), 0.0, "one step reaches the mirror alone");
-    // A white wall beside adds nothing: whitted has no second diffuse bounce, path has.
+    // A white wall next to it adds nothing: whitted has no second diffuse bounce, path has.
     let white = add_material(&mut desc, diffuse(0.9));
     let wall = Cuboid::new(PLACE + DVec3::new(1.0, -9.0, -1.0), PLACE + DVec3::new(2.0, 9.0, 9.0)).unwrap();
     add(&mut desc, exact(wall), white);
@@ -181,8 +181,8 @@ fn roulette_changes_the_noise_and_not_the_mean() {
 
 #[test]
 fn light_behind_glass_comes_back_through_its_square_of_eta() {
-    // Under a slab of glass the floor is seen through two refractions: radiance is scaled by η² and back, so that a floor
-    // that shines looks as bright as its two interfaces let through, whatever η is in between.
+    // Under a slab of glass the floor is seen through two refractions: radiance is scaled by η² and back, so that a
+    // floor that shines looks as bright as its two interfaces let through, whatever η is in between.
     let mut desc = empty();
     let glass = add_material(
         &mut desc,
@@ -214,7 +214,8 @@ fn light_behind_glass_comes_back_through_its_square_of_eta() {
     assert_close(mean(&image)[0], 2.0 * through, 2e-3, "slab");
 }
 
-/// Cameras look through the backs of one-sided faces, by rays in double precision; what leaves the faces is traced in single.
+/// Cameras look through the backs of one-sided faces, by rays in double precision; what leaves the faces is traced in
+/// single.
 #[test]
 fn rays_that_leave_one_sided_meshes_do_not_meet_them_again() {
     let [two_sided, one_sided] = [false, true].map(|one_sided| {

@@ -108,7 +108,7 @@ fn a_sphere_without_a_border_takes_what_its_chords_say() {
     let side = 3.0;
     for found in both(&desc, over(0.5 * side), 64, 64) {
         for (channel, found) in found.into_iter().enumerate() {
-            // ∫ exp(−2 σ √(r² − ρ²)) 2 π ρ dρ over the disk, and 1 beside it.
+            // ∫ exp(−2 σ √(r² − ρ²)) 2 π ρ dρ over the disk, and 1 outside it.
             let s = sigma(channel);
             let disk = std::f64::consts::PI / (2.0 * s * s)
                 * (1.0 - (-2.0 * s * radius).exp() * (1.0 + 2.0 * s * radius));
@@ -221,7 +221,7 @@ fn a_deep_body_shows_the_colour_that_many_collisions_leave() {
     let area = side * side;
     let found = by_paths(desc, over(0.5 * side), 48, 256);
     for (found, expected) in found.into_iter().zip(color.to_array()) {
-        // A sphere shows every angle as often as it counts; beside it is the sky. The formula is a fit.
+        // A sphere shows every angle as often as it counts; around it is the sky. The formula is a fit.
         let found = (found * area - (area - disk)) / disk;
         assert_close(found, f64::from(expected), 0.03, "the colour of wax");
     }

@@ -11,7 +11,7 @@ use lumbre_render::{Event, explain_sample};
 use lumbre_scene::{IntegratorKind, LightDesc, Scene};
 use lumbre_shading::Spectrum;
 
-/// The light of a path as its journal tells it.
+/// The light of a path by its journal.
 fn told(events: &[Event]) -> Spectrum {
     events.iter().fold(Spectrum::BLACK, |sum, event| match event {
         Event::Added { added, .. } => sum + *added,

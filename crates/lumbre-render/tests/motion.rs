@@ -168,7 +168,7 @@ fn a_wheel_covers_a_place_for_its_share_of_the_turn() {
     assert!(seen > 800, "{seen}");
 }
 
-/// A floor, a ball over it that a lamp far away lights, and a mirror beside it.
+/// A floor, a ball over it that a lamp far away lights, and a mirror next to it.
 fn stage() -> SceneDesc {
     let mut desc = empty();
     let white = add_material(&mut desc, diffuse(0.8));

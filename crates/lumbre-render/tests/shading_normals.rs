@@ -33,7 +33,8 @@ fn at_angle(degrees: f64) -> DVec3 {
     DVec3::new(sin, 0.0, cos)
 }
 
-/// A Lambert triangle that lies flat, whose normals lean by this many degrees, with one point light and one camera close by.
+/// A Lambert triangle that lies flat, whose normals lean by this many degrees, with one point light and one camera
+/// close by.
 fn leaning(normal: f64, light: f64, distance: f64, viewer: f64) -> SceneDesc {
     let mut desc = empty();
     let grey = add_material(&mut desc, diffuse(REFLECTANCE as f32));
@@ -93,8 +94,8 @@ fn pbrt_uses_the_cosine_to_the_shading_normal() {
 
 #[test]
 fn hit_and_sampled_light_below_a_face_agree() {
-    // A wide lamp, half of it under the plane of the face: found by sampling it and by the BSDF alike, to the closed form of a
-    // furnace about the shading normal: a white sky gives the reflectance, whatever the geometric normal.
+    // A wide lamp, half of it under the plane of the face: found by sampling it and by the BSDF alike, to the closed
+    // form of a furnace about the shading normal: a white sky gives the reflectance, whatever the geometric normal.
     let mut desc = leaning(35.0, 60.0, 3.0, 10.0);
     desc.lights = vec![LightDesc::Infinite {
         world_from_light: Transform::IDENTITY,

@@ -16,7 +16,7 @@ use lumbre_scene::{Footprint, GeometryDesc, IntegratorDesc, LightDesc, MeshDesc,
 pub(crate) const CENTER: DVec3 = DVec3::new(2.0, -1.0, 0.5);
 pub(crate) const RADIUS: f64 = 1.5;
 
-/// A sphere of `bands` times twice as many faces about the z axis, with the normals of the sphere or none.
+/// A sphere of `bands` times `2 * bands` faces about the z axis, with the normals of the sphere or none.
 pub(crate) fn globe(bands: u32, is_smooth: bool) -> GeometryDesc {
     let around = 2 * bands;
     let mut unit = vec![];

@@ -1,4 +1,4 @@
-//! Nanoseconds a sample of light, a density and an escaped ray: scalar code beside lanes at every instruction set.
+//! Nanoseconds a sample of light, a density and an escaped ray: scalar code against lanes at every instruction set.
 //!
 //! `cargo run --release -p lumbre-scene --example light_speed`
 

@@ -20,6 +20,7 @@ use crate::light::{
 use crate::light_colour::LightColour;
 use crate::media::{self, Boundaries, Media};
 use crate::mesh::{self, QuadOrder};
+use crate::scene::SceneTraits;
 use crate::specular::Specular;
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
@@ -119,14 +120,16 @@ impl Scene {
             integrator,
             pov,
             bounds,
-            has_cutouts,
-            is_transmissive,
-            has_delta_transmission,
-            has_solids,
-            has_one_sided,
-            has_instances: !objects.is_empty(),
-            moves,
-            is_textured,
+            traits: SceneTraits {
+                has_cutouts,
+                is_transmissive,
+                has_delta_transmission,
+                has_solids,
+                has_one_sided,
+                has_instances: !objects.is_empty(),
+                moves,
+                is_textured,
+            },
             specular_spheres: specular.spheres(&bounds),
             ground: ground.map(|desc| GroundPlane::new(desc, &lighting.lights)),
             lane_lights: lighting.lane_lights,
@@ -150,7 +153,6 @@ impl Scene {
     ///
     /// # Errors
     /// [`BuildError`], naming the camera or light at fault, or if there is no camera.
-    /// [`BuildError`], naming the camera or light at fault, and where there is no camera.
     pub fn relit(
         &self,
         cameras: Vec<Camera>,
@@ -168,7 +170,8 @@ impl Scene {
         if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::is_emissive) {
             builder.warnings.push(BuildWarning::NoLight);
         }
-        let moves = self.moves || lights.iter().any(|light| matches!(light.bare(), LightDesc::Moving { .. }));
+        let moves =
+            self.traits.moves || lights.iter().any(|light| matches!(light.bare(), LightDesc::Moving { .. }));
         builder.place_lights(lights)?;
         let lighting = Lighting::new(builder.lights, builder.light_colours, &self.entries, &self.bounds);
         let ground = self.ground.as_ref().map(|ground| GroundPlane::new(ground.desc(), &lighting.lights));
@@ -193,14 +196,7 @@ impl Scene {
             ground,
             specular_spheres: self.specular_spheres.clone(),
             warnings: builder.warnings,
-            has_cutouts: self.has_cutouts,
-            is_transmissive: self.is_transmissive,
-            has_delta_transmission: self.has_delta_transmission,
-            has_solids: self.has_solids,
-            has_one_sided: self.has_one_sided,
-            has_instances: self.has_instances,
-            moves,
-            is_textured: self.is_textured,
+            traits: SceneTraits { moves, ..self.traits },
         })
     }
 
@@ -643,7 +639,7 @@ impl Builder {
         self.lights.push(light);
     }
 
-    /// Adds the lights other than shapes, after those that are shapes.
+    /// Adds the lights other than shapes, after shapes.
     fn place_lights(&mut self, lights: Vec<LightDesc>) -> Result<(), BuildError> {
         self.light_colours = vec![LightColour::Surface; self.lights.len()];
         for (position, light) in lights.into_iter().enumerate() {

@@ -29,7 +29,7 @@ pub enum SphericalMapping {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WideProjection {
     /// The distance from the middle of the picture is the angle from the axis: `angle` across the unit circle, outside
-    /// of which the picture is black. `size` is the size of the picture.
+    /// outside of which the picture is black. `size` is the size of the picture.
     Fisheye {
         /// Across the circle.
         angle: f64,
@@ -189,7 +189,8 @@ pub struct Camera {
     pub clip: Option<ClipPlane>,
 }
 
-/// A plane that hides everything in front of it from the camera. Camera rays begin behind it; light and shadows ignore it.
+/// A plane that hides everything in front of it from the camera. Camera rays begin behind it; light and shadows ignore
+/// it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClipPlane {
     /// A point of it.

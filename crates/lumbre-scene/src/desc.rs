@@ -256,7 +256,7 @@ pub struct MeshMotion {
     pub moments: Vec<MeshMoment>,
 }
 
-/// The vertices of a mesh at one key, as many as in the mesh.
+/// The vertices of a mesh at one key, one for each of the mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshMoment {
     /// The positions.
@@ -448,7 +448,8 @@ pub enum FilmSpace {
     World,
 }
 
-/// A range of wavelengths, cut into equal parts. A film with buckets samples the wavelengths of the range evenly, and none outside.
+/// A range of wavelengths, cut into equal parts. A film with buckets samples the wavelengths of the range evenly, and
+/// none outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Buckets {
     /// The parts: at least one.

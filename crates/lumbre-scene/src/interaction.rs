@@ -39,7 +39,7 @@ pub struct Interaction<'s> {
     pub(crate) geometric: Option<Box<Surface>>,
     /// The origin of rays that leave on the incident side.
     pub(crate) incident_origin: DVec3,
-    /// The offset from the point to the smooth surface implied by vertex normals, where that is above the face.
+    /// The offset from the incident origin to the smooth surface implied by vertex normals, if that is above the face.
     pub(crate) terminator_offset: Option<DVec3>,
     /// The width of the footprint across the ray, and its growth with distance.
     pub(crate) width: f64,
@@ -81,7 +81,8 @@ impl<'s> Interaction<'s> {
         self.leave_from(self.start(direction), direction)
     }
 
-    /// The ray that leaves along a unit direction from another origin, such as [`Interaction::unoccluded_terminator_origin`].
+    /// The ray that leaves along a unit direction from another origin, such as
+    /// [`Interaction::unoccluded_terminator_origin`].
     pub fn leave_from(&self, start: DVec3, direction: DVec3) -> Ray {
         Ray::new(start, direction).at_time(self.time)
     }
@@ -99,19 +100,18 @@ impl<'s> Interaction<'s> {
         Ray::new(start, stop - start).with_range(0.0, 1.0 - f64::powi(2.0, -40)).at_time(self.time)
     }
 
-    /// The shadow terminator offset: the corresponding point on the smooth surface implied by the vertex
-    /// normals, on the incident side. `None` where the mesh is not smooth, where the face is concave, or where
-    /// something lies between the two points.
-    ///
-    /// Rays that go below the plane of the face but not below the smooth surface leave from there, so that the
-    /// face, which only approximates it, does not occlude them.
+    /// [`Interaction::terminator_origin`], unless something lies between it and the face.
     pub fn unoccluded_terminator_origin(&self, scene: &Scene) -> Option<DVec3> {
         let terminator_offset = self.terminator_offset?;
         let way = self.leave_from(self.incident_origin, terminator_offset).with_range(0.0, 1.0);
         (!scene.is_occluded(&way)).then(|| self.incident_origin + terminator_offset)
     }
 
-    /// [`Interaction::unoccluded_terminator_origin`] without the test for objects in between.
+    /// The corresponding point on the smooth surface implied by the vertex normals, on the incident side: the face plus
+    /// the shadow terminator offset. `None` if the mesh is not smooth or the face is concave.
+    ///
+    /// Rays that go below the plane of the face but not below the smooth surface start there, so that the face, which
+    /// only approximates it, does not occlude them.
     pub fn terminator_origin(&self) -> Option<DVec3> {
         Some(self.incident_origin + self.terminator_offset?)
     }

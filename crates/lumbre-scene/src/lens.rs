@@ -31,8 +31,8 @@ pub struct ApertureImage {
 }
 
 impl ApertureImage {
-    /// From rows from bottom to top, scaled to transmit as much light as a round stop. `None` if there are not as many
-    /// numbers as pixels, some are negative or not finite, or all are 0.
+    /// From rows from bottom to top, scaled to transmit as much light as a round stop. `None` if there are fewer or
+    /// more numbers as pixels, some are negative or not finite, or all are 0.
     pub fn new(width: usize, height: usize, mut values: Vec<f32>) -> Option<Self> {
         let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
         let fits = width > 0 && height > 0 && width.checked_mul(height) == Some(values.len());

@@ -26,11 +26,12 @@ pub(crate) enum QuadOrder {
     Patch,
 }
 
-/// What is left of meshes without attributes: files have many small ones, and their descriptions are larger than they are.
+/// What is left of meshes without attributes: files have many small ones, and their descriptions are larger than they
+/// are.
 static BARE: LazyLock<Arc<MeshDesc>> = LazyLock::new(Arc::default);
 
-/// Transforms a mesh into the space of its tree. Where it may be split, triangles are that have vertices of others on their edges: see
-/// [`seams`].
+/// Transforms a mesh into the space of its tree. Where it may be split, triangles are that have vertices of others on
+/// their edges: see [`seams`].
 ///
 /// # Errors
 /// Lists of the wrong length, faces with missing vertices, and vertices that are not finite.

@@ -59,7 +59,13 @@ pub struct Scene {
     pub(crate) ground: Option<GroundPlane>,
     pub(crate) specular_spheres: Vec<BoundingSphere>,
     pub(crate) warnings: Vec<BuildWarning>,
-    // Whether shadow rays must check every hit: there are cut-outs or interfaces.
+    pub(crate) traits: SceneTraits,
+}
+
+/// What a scene has, so that rays can skip what it has not.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SceneTraits {
+    /// Whether shadow rays must check every hit: there are cut-outs or interfaces.
     pub(crate) has_cutouts: bool,
     /// Whether any material transmits light.
     pub(crate) is_transmissive: bool,
@@ -67,11 +73,13 @@ pub struct Scene {
     pub(crate) has_delta_transmission: bool,
     /// Whether any material encloses a solid that light passes through.
     pub(crate) has_solids: bool,
-    // Whether any material is one-sided.
+    /// Whether any material is one-sided.
     pub(crate) has_one_sided: bool,
+    /// Whether there are instances.
     pub(crate) has_instances: bool,
+    /// Whether anything moves.
     pub(crate) moves: bool,
-    // Whether any material has textures, so that rays need footprints.
+    /// Whether any material has textures, so that rays need footprints.
     pub(crate) is_textured: bool,
 }
 
@@ -197,7 +205,7 @@ impl Scene {
 
     /// Whether anything moves, other than cameras.
     pub fn moves(&self) -> bool {
-        self.moves
+        self.traits.moves
     }
 
     /// The bounding box of everything finite; may be empty.
@@ -231,8 +239,8 @@ impl Scene {
         entry.primitive(part)
     }
 
-    /// The part of what has an id in the tree that results give for one that queries of points find there: of a triangle that was
-    /// split, the whole.
+    /// The part of what has an id in the tree that results give for one that queries of points find there: of a
+    /// triangle that was split, the whole.
     ///
     /// # Panics
     /// When there is no such id.
@@ -251,18 +259,18 @@ impl Scene {
 
     /// Whether any material transmits light: glass, panes, leaves. Cut-outs do not count.
     pub fn is_transmissive(&self) -> bool {
-        self.is_transmissive
+        self.traits.is_transmissive
     }
 
     /// Whether any material encloses a solid that light passes through.
     pub fn has_solids(&self) -> bool {
-        self.has_solids
+        self.traits.has_solids
     }
 
     /// Whether any material transmits light straight on ([`lumbre_shading::Bsdf::straight_on`]), such as a thin
     /// smooth pane.
     pub fn has_delta_transmission(&self) -> bool {
-        self.has_delta_transmission
+        self.traits.has_delta_transmission
     }
 
     /// Whether the hit surface may transmit light straight on.
@@ -277,7 +285,7 @@ impl Scene {
 
     /// The closest hit, skipping cut-outs and interfaces.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        if self.has_cutouts {
+        if self.traits.has_cutouts {
             let is_solid = |hit: &Hit| self.is_solid(ray, hit);
             self.accel.closest_with(ray, &Query::new().filter(&is_solid))
         } else {
@@ -288,7 +296,7 @@ impl Scene {
     /// The closest hit visible to a camera: as [`Scene::closest`], also skipping the backs of one-sided
     /// materials.
     pub fn closest_seen(&self, ray: &Ray) -> Option<Hit> {
-        if self.has_one_sided {
+        if self.traits.has_one_sided {
             let is_seen = |hit: &Hit| !self.is_back_of_one_sided(ray, hit) && self.is_solid(ray, hit);
             self.accel.closest_with(ray, &Query::new().filter(&is_seen))
         } else {
@@ -299,9 +307,9 @@ impl Scene {
     /// [`Scene::closest`] for every ray.
     ///
     /// # Panics
-    /// When there are not as many places for hits as rays.
+    /// If the numbers of hits and rays differ.
     pub fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        if self.has_cutouts {
+        if self.traits.has_cutouts {
             assert_eq!(rays.len(), hits.len(), "a place for each hit");
             hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest(ray));
         } else {
@@ -312,9 +320,9 @@ impl Scene {
     /// [`Scene::closest_seen`] for every ray.
     ///
     /// # Panics
-    /// When there are not as many places for hits as rays.
+    /// If the numbers of hits and rays differ.
     pub fn closest_seen_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        if self.has_one_sided {
+        if self.traits.has_one_sided {
             assert_eq!(rays.len(), hits.len(), "a place for each hit");
             hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest_seen(ray));
         } else {
@@ -325,9 +333,9 @@ impl Scene {
     /// [`Scene::is_occluded`] for every ray.
     ///
     /// # Panics
-    /// When there are not as many answers as rays.
+    /// If the numbers of answers and rays differ.
     pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        if self.has_cutouts {
+        if self.traits.has_cutouts {
             assert_eq!(rays.len(), occluded.len(), "an answer for each ray");
             occluded.iter_mut().zip(rays).for_each(|(occluded, ray)| *occluded = self.is_occluded(ray));
         } else {
@@ -337,7 +345,7 @@ impl Scene {
 
     /// Whether a shadow ray is occluded.
     pub fn is_occluded(&self, ray: &Ray) -> bool {
-        if self.has_cutouts {
+        if self.traits.has_cutouts {
             let is_solid = |hit: &Hit| self.is_solid(ray, hit);
             self.accel.any_with(ray, &Query::new().filter(&is_solid))
         } else {
@@ -373,17 +381,17 @@ impl Scene {
 
     /// Whether shadow rays and paths pass through some surfaces: cut-outs and interfaces.
     pub fn has_cutouts(&self) -> bool {
-        self.has_cutouts
+        self.traits.has_cutouts
     }
 
     /// Whether cameras look through the backs of some surfaces.
     pub fn has_one_sided(&self) -> bool {
-        self.has_one_sided
+        self.traits.has_one_sided
     }
 
     /// Whether any material has textures, so that rays need footprints.
     pub fn is_textured(&self) -> bool {
-        self.is_textured
+        self.traits.is_textured
     }
 
     /// The interaction at a hit.
@@ -414,7 +422,7 @@ impl Scene {
         let spot = if entry.is_textured {
             let (dpdu, dpdv) = (surface.dpdu, surface.dpdv);
             footprint.on_plane(surface.point, surface.normal, dpdu, dpdv, direction, hit.root.t * length)
-        } else if self.is_textured {
+        } else if self.traits.is_textured {
             footprint.across(surface.point, surface.normal, direction, hit.root.t * length)
         } else {
             SurfaceFootprint::default()
@@ -517,8 +525,8 @@ impl Scene {
         self.lights[light.0 as usize].sample(&self.entries, from, time, u)
     }
 
-    /// The density per unit solid angle with which [`Scene::sample_light`] samples `hit` from `from` with a normal; 0 if it
-    /// never does.
+    /// The density per unit solid angle with which [`Scene::sample_light`] samples `hit` from `from` with a normal; 0
+    /// if it never does.
     pub fn light_pdf(&self, from: DVec3, normal: DVec3, hit: &Interaction) -> f32 {
         let (Some(light), Some(geometric)) = (hit.light, &hit.geometric) else { return 0.0 };
         let surface = Some((&**geometric, hit.primitive));
@@ -561,7 +569,8 @@ impl Scene {
 
     /// The transform of the innermost instance of a hit; `None` in the world itself.
     fn placement(&self, ray: &Ray, hit: &Hit) -> Option<Transform> {
-        (self.has_instances && !hit.instances.is_empty()).then(|| self.accel.world_from_object(ray, hit))
+        (self.traits.has_instances && !hit.instances.is_empty())
+            .then(|| self.accel.world_from_object(ray, hit))
     }
 
     fn shading_geometry(
@@ -588,7 +597,7 @@ impl Scene {
     /// # Panics
     /// If there is no such id.
     pub fn may_be_cutout(&self, id: u32) -> bool {
-        self.has_cutouts && self.entries[id as usize].has_cutouts()
+        self.traits.has_cutouts && self.entries[id as usize].has_cutouts()
     }
 
     /// Whether cameras may look through the back of the surface with an id in the tree.
@@ -596,7 +605,7 @@ impl Scene {
     /// # Panics
     /// If there is no such id.
     pub fn may_be_one_sided(&self, id: u32) -> bool {
-        self.has_one_sided && self.entries[id as usize].is_one_sided_anywhere()
+        self.traits.has_one_sided && self.entries[id as usize].is_one_sided_anywhere()
     }
 
     /// Whether a hit is on the back of a one-sided surface, which cameras look through.

@@ -1,8 +1,9 @@
 //! Triangles whose edges others meet in between, split there, so that no ray passes the seam.
 //!
-//! Programs close a gap at a vertex within the edge of a triangle by another triangle, which has no area. No ray hits that one, and
-//! whether a ray passes on one side of the edge or of its two parts is then decided by rounding, twice. Split at the vertex, the
-//! triangle has the same edges as those on the other side, and every ray that crosses the seam hits one of them.
+//! Programs close a gap at a vertex within the edge of a triangle by another triangle, which has no area. No ray hits
+//! that one, and whether a ray passes on one side of the edge or of its two parts is then decided by rounding, twice.
+//! Split at the vertex, the triangle has the same edges as those on the other side, and every ray that crosses the seam
+//! hits one of them.
 
 use std::collections::HashMap;
 
@@ -83,7 +84,8 @@ impl<'a> Seams<'a> {
         seams
     }
 
-    /// The vertices between two others, in their order; `None` where they are more than `room`, of which they take their share.
+    /// The vertices between two others, in their order; `None` if they are more than `room`, from which they are
+    /// subtracted.
     fn along(&self, from: u32, to: u32, room: &mut usize) -> Option<Vec<u32>> {
         let at = |vertex: u32| self.positions[vertex as usize];
         let (mut last, mut ahead, mut all) = (from, vec![to], Vec::new());
@@ -106,8 +108,9 @@ impl<'a> Seams<'a> {
     }
 }
 
-/// Splits the triangles that have an edge with vertices between its ends, by what triangles without area say. The first part of each
-/// takes its place, and the others are appended. `None` where there are none, and where there would be too many.
+/// Splits the triangles that have an edge with vertices between its ends, by what triangles without area say. The first
+/// part of each takes its place, and the others are appended. `None` where there are none, and where there would be too
+/// many.
 pub(crate) fn split(positions: &[Vec3], triangles: &mut Vec<[u32; 3]>) -> Option<Pieces> {
     let seams = Seams::of(positions, triangles);
     // Of a large mesh, few vertices are the end of a seam.
@@ -160,7 +163,7 @@ struct Corner {
     local: DVec2,
 }
 
-/// Cuts a triangle with vertices on its edges, of which the first is that from the first corner to the second, into triangles with the
+/// Cuts a triangle with vertices on its edges (the first edge is from corner 0 to corner 1), into triangles with the
 /// same orientation.
 fn cut(positions: &[Vec3], corners: [u32; 3], on: &[Vec<u32>; 3], parts: &mut Vec<[Corner; 3]>) {
     const LOCAL: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::Y];
@@ -180,7 +183,8 @@ fn cut(positions: &[Vec3], corners: [u32; 3], on: &[Vec<u32>; 3], parts: &mut Ve
     };
     let first = on.iter().position(|on| !on.is_empty()).unwrap_or(0);
     let [base, right, left] = [0, 1, 2].map(|i| chain((first + i) % 3));
-    // From both ends of the base to the opposite corner there may be vertices, too: a fan from the next vertex of the base takes them.
+    // From both ends of the base to the opposite corner there may be vertices, too: a fan from the next vertex of the
+    // base takes them.
     let fan = |apex: Corner, rim: &[Corner]| -> Vec<[Corner; 3]> {
         rim.windows(2).map(|side| [apex, side[0], side[1]]).collect()
     };
@@ -200,8 +204,8 @@ mod tests {
 
     #[test]
     fn triangles_are_split_at_vertices_on_their_edges() {
-        // The edge from 0 to 1 has 3, 4 and 5 in between, by three triangles without area; that from 1 to 2 has 6, by one that
-        // names the ends otherwise.
+        // The edge from 0 to 1 has 3, 4 and 5 in between, by three triangles without area; that from 1 to 2 has 6, by
+        // one that names the ends otherwise.
         let positions = [
             [1.0, 2.0, 0.5],
             [9.0, 2.0, 0.5],

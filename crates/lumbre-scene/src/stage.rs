@@ -19,7 +19,7 @@ use crate::{
 pub struct Stage {
     /// Whether to replace the description's cameras by one that frames everything.
     pub fit: bool,
-    /// The picture's width and height in pixels, which the automatic view fills; by default the description's
+    /// The picture's width and height in pixels, which the automatic camera frames for; by default the description's
     /// own, or 1200 by 900.
     pub size: Option<(u32, u32)>,
     /// The rotation of the automatic camera about the model, as a fraction of a turn; the model stays in view
@@ -152,22 +152,22 @@ impl Stage {
 
         let light = match &self.surroundings {
             Surroundings::Map(map) => {
-                desc.lights.retain(is_finite);
+                remove_infinite_lights(desc);
                 desc.lights.push(around(desc.up, map));
                 StageLight::Given
             }
             Surroundings::Light(light) => {
-                desc.lights.retain(is_finite);
+                remove_infinite_lights(desc);
                 desc.lights.push(LightDesc::clone(light));
                 StageLight::Given
             }
             Surroundings::Sky(sky) => {
-                desc.lights.retain(is_finite);
+                remove_infinite_lights(desc);
                 desc.lights.extend(sky.lights(&world_from_sky(desc.up)));
                 StageLight::Given
             }
             Surroundings::Studio => {
-                desc.lights.retain(is_finite);
+                remove_infinite_lights(desc);
                 StageLight::Studio
             }
             Surroundings::Automatic if wants_studio(desc) => StageLight::Studio,
@@ -234,9 +234,14 @@ impl Stage {
     }
 }
 
-/// Whether a light is not one of those that stand for what is around.
-fn is_finite(light: &LightDesc) -> bool {
-    !matches!(light.bare(), LightDesc::Infinite { .. } | LightDesc::Portal { .. } | LightDesc::Disc { .. })
+/// Removes the lights that stand for the surroundings, also those with a spectrum.
+fn remove_infinite_lights(desc: &mut SceneDesc) {
+    desc.lights.retain(|light| {
+        !matches!(
+            light.bare(),
+            LightDesc::Infinite { .. } | LightDesc::Portal { .. } | LightDesc::Disc { .. }
+        )
+    });
 }
 
 /// The placement of a sky: east is to the right of the automatic camera, and north away from it.
@@ -298,7 +303,8 @@ mod tests {
     use super::*;
     use crate::{AreaLightDesc, Camera, CameraKind, MaterialId, NamedMaterial, Scene};
     use lumbre_geometry::{Ray, Sphere};
-    use lumbre_shading::Material;
+    use lumbre_shading::spectrum::LightCurve;
+    use lumbre_shading::{Material, SpectrumValue};
 
     fn ball() -> SceneDesc {
         let ball = Sphere::new(DVec3::new(3.0, 7.0, -4.0), 2.5).unwrap();
@@ -400,7 +406,33 @@ mod tests {
     }
 
     #[test]
-    fn a_map_takes_the_place_of_all_light_from_far_away_and_of_nothing_else() {
+    fn surroundings_replace_infinite_lights_of_any_spectrum() {
+        let sky =
+            LightDesc::Infinite { world_from_light: Transform::IDENTITY, radiance: Rgb::WHITE, image: None };
+        let spectral = || LightDesc::Spectral {
+            light: Box::new(sky.clone()),
+            spectrum: Arc::new(LightCurve::of(&SpectrumValue::Blackbody(4000.0)).unwrap()),
+        };
+        let image = Image::filled(8, 4, Rgb::new(0.5, 1.0, 2.0));
+        let map = EnvironmentDesc::of_image(Arc::new(image)).unwrap();
+        let given = LightDesc::Infinite {
+            world_from_light: Transform::IDENTITY,
+            radiance: Rgb::new(0.2, 0.3, 0.4),
+            image: None,
+        };
+        for surroundings in
+            [Surroundings::Map(map), Surroundings::Light(Box::new(given)), Surroundings::Studio]
+        {
+            let mut desc = SceneDesc { lights: vec![spectral(), lamp()], ..ball() };
+            Stage { surroundings, ..Stage::default() }.set(&mut desc);
+            assert_eq!(desc.lights.len(), 2);
+            assert!(matches!(desc.lights[0], LightDesc::Point { .. }));
+            assert!(!matches!(desc.lights[1], LightDesc::Spectral { .. }));
+        }
+    }
+
+    #[test]
+    fn a_map_replaces_infinite_lights_only() {
         let image = Image::filled(8, 4, Rgb::new(0.5, 1.0, 2.0));
         let map = EnvironmentDesc::of_image(Arc::new(image)).unwrap();
         let sky =

@@ -97,7 +97,7 @@ pub(crate) struct MeshAttributes {
     pub moving: Option<Box<Deforming>>,
     /// The mesh that rays meet instead of `mesh`, if vertices are given in double precision.
     pub precise: Option<Arc<PreciseMesh>>,
-    /// The parts of triangles that were split, if any: the triangles of `mesh` are those that rays meet.
+    /// The parts of triangles that were split, if any: rays meet the triangles of `mesh`.
     pub pieces: Option<Box<Pieces>>,
     /// The description, which may be shared, without the parts that were moved into the mesh.
     pub rest: Arc<MeshDesc>,

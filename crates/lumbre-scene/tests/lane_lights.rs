@@ -45,7 +45,7 @@ impl Answer {
     }
 }
 
-/// A column of numbers, in pieces of as many as there are lanes; the last piece is filled up with the last number.
+/// A column of numbers, in pieces of one vector; the last piece is filled up with the last number.
 fn padded<T: Copy>(numbers: impl Iterator<Item = T>) -> Vec<T> {
     let mut numbers: Vec<T> = numbers.collect();
     let last = *numbers.last().unwrap();

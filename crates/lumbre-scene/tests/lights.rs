@@ -107,8 +107,8 @@ fn the_density_of_what_a_ray_finds_is_that_of_the_sample() {
     assert!(count > 500, "{count}");
 }
 
-/// The irradiance by radiance 1 of a rectangle on a surface that faces `normal`, all of it being before both: Lambert's sum over the
-/// sides of the polygon.
+/// The irradiance by radiance 1 of a rectangle on a surface that faces `normal`, all of it being before both: Lambert's
+/// sum over the sides of the polygon.
 fn lambert(corners: &[DVec3], normal: DVec3) -> f64 {
     let sides = corners.iter().zip(corners.iter().cycle().skip(1));
     let sum: f64 = sides.map(|(a, b)| a.angle_between(*b) * a.cross(*b).normalize().dot(normal)).sum();
@@ -141,7 +141,8 @@ fn rectangles_of_triangles_match_lambert_near_and_far() {
             let Scatter::Density(pdf) = sample.scatter else { panic!("{sample:?}") };
             let cosine = -sample.towards.dot(normal);
             sum += f64::from(sample.radiance.average()) * cosine / f64::from(pdf);
-            // What a ray finds of either triangle has the density of the samples, and the mean of its inverse is the solid angle.
+            // What a ray finds of either triangle has the density of the samples, and the mean of its inverse is the
+            // solid angle.
             of_one += 1.0 / f64::from(pdf);
             let ray = Ray::new(from, sample.towards);
             let Some(hit) = scene.closest(&ray) else { continue };
@@ -203,7 +204,7 @@ fn sky_samples_for_mis_have_the_density_of_escaping_rays() {
             let arriving = f64::from(radiance.average()) * cosine(ray.direction);
             light += share * sphere * arriving;
             by_both += share * arriving / (f64::from(pdf) + 1.0 / sphere);
-            // And those that are sampled.
+            // And sampled ones.
             let Some(sample) = scene.sample_light(DVec3::ONE, DVec3::ZERO, 0.0, 0.5, u) else { continue };
             let ray = Ray::new(DVec3::ONE, sample.towards);
             let (radiance, pdf) = scene.escaped(&ray, DVec3::ZERO).next().unwrap();
@@ -240,7 +241,8 @@ fn a_sky_that_is_the_same_all_around_is_sampled_evenly() {
             let direction = warp64::square_to_sphere(DVec2::new(random.next_f64(), random.next_f64()));
             let ray = Ray::new(DVec3::ONE, direction);
             let (_, pdf) = scene.escaped(&ray, DVec3::ZERO).next().unwrap();
-            // A row of the picture between circles of latitude is sampled evenly in the angle, which is not so even near the poles.
+            // A row of the picture between circles of latitude is sampled evenly in the angle, which is not so even
+            // near the poles.
             assert!(
                 direction.z.abs() > 0.8 || (f64::from(pdf) * 4.0 * std::f64::consts::PI - 1.0).abs() < 0.2,
                 "{direction} {pdf}"
@@ -249,7 +251,8 @@ fn a_sky_that_is_the_same_all_around_is_sampled_evenly() {
     }
 }
 
-/// A rectangle of two triangles with a picture that is dim but for one texel in 4,096: its radiance over uv, and the scene.
+/// A rectangle of two triangles with a picture that is dim but for one texel in 4,096: its radiance over uv, and the
+/// scene.
 fn screen(corner: DVec3, sides: [DVec3; 2], has_normals: bool) -> (Arc<MipMap>, Scene) {
     const SIDE: usize = 64;
     let mut texels = vec![0.02; 3 * SIDE * SIDE];
@@ -310,7 +313,8 @@ fn one_bright_texel_of_thousands_is_found_from_near_and_far() {
                 same += u32::from((scene.light_pdf(from, -normal, &met) / pdf - 1.0).abs() < 1e-3);
             }
             assert!((mean / expected - 1.0).abs() < 0.03, "{distance}: {mean} {expected}");
-            // The variance of one sample is less than twice the square of the mean; by area it is some hundred times that.
+            // The variance of one sample is less than twice the square of the mean; by area it is some hundred times
+            // that.
             assert!(square < 3.0 * expected * expected, "{distance}: {square} {expected}");
             let seen = [[a, a + b], [a + b, b]].map(|[p, q]| {
                 let at = corner - from;

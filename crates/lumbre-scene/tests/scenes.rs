@@ -453,7 +453,7 @@ fn a_hole_shows_the_material_of_what_was_taken_away() {
         assert_eq!((met.shape, met.front), (12, true), "mesh: {as_mesh}");
         assert!((met.surface.point - DVec3::new(20.5, 0.0, 5.25)).length() < 1e-6);
         assert!((met.surface.normal - DVec3::Z).length() < 1e-6);
-        // Beside the hole: the block's own top.
+        // Next to the hole: the block's own top.
         let met = meet(&scene, &Ray::new(DVec3::new(18.5, 0.3, 15.0), -DVec3::Z));
         assert_eq!((met.shape, met.front), (11, true), "mesh: {as_mesh}");
         assert!((met.surface.point.z - 6.5).abs() < 1e-6 && (met.surface.normal - DVec3::Z).length() < 1e-6);

@@ -239,7 +239,7 @@ impl<R: Real> Task<R> for At<'_, R> {
     }
 }
 
-/// A value between pages, of which that of the lowest index is named.
+/// A value between pages; the page of the lowest index is given.
 struct ByIndex<'a, R: Real> {
     eta: R,
     at: At<'a, R>,

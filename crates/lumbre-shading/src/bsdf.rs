@@ -11,31 +11,7 @@ use crate::measured::Measured;
 use crate::principled::Principled;
 use crate::subsurface::Subsurface;
 use crate::uber::Uber;
-use crate::{LocalDir, Spectrum};
-
-/// How a direction was sampled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scatter {
-    /// With this density per unit solid angle.
-    Density(f32),
-    /// As the only possible direction, such as a mirror's: it has no density.
-    Delta,
-}
-
-/// A direction sampled from a BSDF.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BsdfSample {
-    /// The direction of incidence.
-    pub wi: LocalDir,
-    /// f · |cos θi| / pdf, ready to multiply a path's throughput.
-    pub weight: Spectrum,
-    /// How it was sampled.
-    pub scatter: Scatter,
-    /// Whether it is on the other side of the surface.
-    pub transmitted: bool,
-    /// η of the side of `wi` over that of the side of `wo`; 1 for a reflection or an unbent transmission.
-    pub eta: f32,
-}
+use crate::{BsdfSample, LocalDir, Spectrum};
 
 /// How a surface scatters at one point. Both directions point away from the surface.
 ///
@@ -167,7 +143,8 @@ impl Bsdf {
     }
 
     /// An estimate of the hemispherical albedo for the AOV of that name: exact for diffuse surfaces, the
-    /// reflectance at normal incidence for metals, 1 for glass and boundaries, that of light from the normal for measured surfaces.
+    /// reflectance at normal incidence for metals, 1 for glass and boundaries, that of light from the normal for
+    /// measured surfaces.
     pub fn albedo(&self) -> Spectrum {
         match self {
             Self::Diffuse(bsdf) => bsdf.reflectance,
@@ -195,7 +172,8 @@ impl Bsdf {
 
     /// The surface with mirrors and sharp lobes made rougher, for parts of a path that are not seen directly:
     /// less noise, fewer sharp details. Each α below 0.3 is doubled and clamped to [0.1, 0.3]. A thin pane is
-    /// returned unchanged, since light passes straight through it, and so is a measured surface; the delta parts of [`Uber`] stay what they are.
+    /// returned unchanged, since light passes straight through it, and so is a measured surface; the delta parts of
+    /// [`Uber`] stay what they are.
     #[must_use]
     pub fn regularized(self) -> Self {
         let metal = |bsdf: Conductor| Conductor { facets: bsdf.facets.regularized(), ..bsdf };

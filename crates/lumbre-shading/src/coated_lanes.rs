@@ -206,8 +206,9 @@ impl<R: Real> CoatedConductorLanes<R> {
         self.pdf_above(wo, wi).or_zero(fits)
     }
 
-    /// The probabilities of the coat's reflection (if both layers are smooth, of that of the whole) and of one reflection from the metal
-    /// through the coat. The rest is cosine-weighted, for scattering in the medium and multiple bounces.
+    /// The probabilities of the coat's reflection (if both layers are smooth, of that of the whole) and of one
+    /// reflection from the metal through the coat. The rest is cosine-weighted, for scattering in the medium and
+    /// multiple bounces.
     #[inline(always)]
     fn lobes(&self, wo: V3<R>) -> [R; 2] {
         let (scatters, both_smooth) = (self.coat.scatters(), self.both_smooth());
@@ -357,7 +358,8 @@ impl<R: Real> LaneBsdf<R> for CoatedConductorLanes<R> {
     }
 }
 
-/// Both directions as seen from the coat's side, and where there is one: both are on one side, neither is in the surface.
+/// Both directions as seen from the coat's side, and where there is one: both are on one side, neither is in the
+/// surface.
 #[inline(always)]
 fn from_above<R: Real>(wo: V3<R>, wi: V3<R>) -> (V3<R>, V3<R>, R::Mask) {
     let is_above = wo.z.simd_gt(R::zero()) & wi.z.simd_gt(R::zero());
@@ -420,8 +422,8 @@ impl<R: Real> CoatLanes<R> {
         transmittance(self.thickness, w)
     }
 
-    /// f · |cos θi| of the coat over a base, both directions above, without mirror reflections: its own and the mean of some walks. 0 in
-    /// inactive lanes.
+    /// f · |cos θi| of the coat over a base, both directions above, without mirror reflections: its own and the mean of
+    /// some walks. 0 in inactive lanes.
     #[inline(always)]
     fn value<B: Base<R>>(&self, base: &B, wo: V3<R>, wi: V3<R>, active: R::Mask) -> V3<R> {
         R::call(Value { coat: self, base, wo, wi, active })
@@ -531,8 +533,8 @@ impl<R: Real> CoatLanes<R> {
         sum
     }
 
-    /// [`CoatLanes::walk`] over a diffuse base, where nothing scatters in the medium. The base forgets where light came from, so that one
-    /// way out, sampled from `wi`, serves for all its reflections.
+    /// [`CoatLanes::walk`] over a diffuse base, where nothing scatters in the medium. The base forgets where light came
+    /// from, so that one way out, sampled from `wi`, serves for all its reflections.
     #[inline(always)]
     fn walk_over_diffuse(&self, reflectance: V3<R>, way: &Way<R>, walk: u32, active: R::Mask) -> V3<R> {
         let Way { wo, wi, random } = way;

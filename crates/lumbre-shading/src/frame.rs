@@ -5,8 +5,9 @@ use lumbre_math::{Vec3, frame::orthonormal_basis_f32};
 /// What is made of normals that differ from the geometric one: those of vertices, and of normal and bump maps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ShadingNormals {
-    /// A normal that faces away from the viewer is turned until it does not; directions that a BSDF scatters to on the wrong side of
-    /// the surface are folded back; shadows on coarse meshes end where the smooth surface turns away. Nothing is black that should not be, and no light leaks.
+    /// A normal that faces away from the viewer is turned until it does not; directions that a BSDF scatters to on the
+    /// wrong side of the surface are folded back; shadows on coarse meshes end where the smooth surface turns away.
+    /// Nothing is black that should not be, and no light leaks.
     #[default]
     Lumbre,
     /// As in pbrt-v4: BSDF and cosine by the shading normal as it is, whatever the side of the surface that a direction

@@ -65,19 +65,21 @@ impl HairParams {
     }
 }
 
-/// The absorption by concentrations of eumelanin and pheomelanin, which are 0 or more: 8 of the first is black hair, 1.3 brown, 0.3 blond.
+/// The absorption by concentrations of eumelanin and pheomelanin, which are 0 or more: 8 of the first is black hair,
+/// 1.3 brown, 0.3 blond.
 ///
-/// Source: E. d'Eon, G. Francois, M. Hill, J. Letteri, J.-M. Aubry, "An Energy-Conserving Hair Reflectance Model", EGSR 2011.
+/// Source: E. d'Eon, G. Francois, M. Hill, J. Letteri, J.-M. Aubry, "An Energy-Conserving Hair Reflectance Model",
+/// EGSR 2011.
 pub fn absorption_of_melanin(eumelanin: f32, pheomelanin: f32) -> Spectrum {
     Spectrum::new(0.419, 0.697, 1.37) * eumelanin.max(0.0)
         + Spectrum::new(0.187, 0.4, 1.05) * pheomelanin.max(0.0)
 }
 
-/// The absorption of fibres of a roughness whose mass has about this colour. Channels are in [0.0001, 1], since no absorption makes hair
-/// black.
+/// The absorption of fibres of a roughness whose mass has about this colour. Channels are in [0.0001, 1], since no
+/// absorption makes hair black.
 ///
-/// Source: M. J.-Y. Chiang, B. Bitterli, C. Tappan, B. Burley, "A Practical and Controllable Hair and Fur Model for Production Path
-/// Tracing", Computer Graphics Forum 35(2), 2016.
+/// Source: M. J.-Y. Chiang, B. Bitterli, C. Tappan, B. Burley, "A Practical and Controllable Hair and Fur Model for
+/// Production Path Tracing", Computer Graphics Forum 35(2), 2016.
 pub fn absorption_of_colour(colour: Spectrum, beta_n: f32) -> Spectrum {
     let b = roughness(beta_n);
     let scale = 5.969 + b * (-0.215 + b * (2.532 + b * (-10.73 + b * (5.574 + b * 0.245))));
@@ -92,20 +94,22 @@ fn roughness(beta: f32) -> f32 {
     if beta.is_nan() { 0.01 } else { beta.clamp(0.01, 1.0) }
 }
 
-/// A fibre, at one place across it: a rough dielectric cylinder that absorbs, with tilted scales. Light is reflected (R), goes through
-/// (TT), is reflected once inside (TRT), or more often; each of these is a lobe around a cone about the fibre.
+/// A fibre, at one place across it: a rough dielectric cylinder that absorbs, with tilted scales. Light is reflected
+/// (R), goes through (TT), is reflected once inside (TRT), or more often; each of these is a lobe around a cone about
+/// the fibre.
 ///
-/// The x axis of its frame is along the fibre. What comes in and what leaves may have any direction: that light goes in at one place and
-/// comes out at another is part of it, so it stands on the surface of a curve as a whole.
+/// The x axis of its frame is along the fibre. What comes in and what leaves may have any direction: that light goes in
+/// at one place and comes out at another is part of it, so it stands on the surface of a curve as a whole.
 ///
-/// All light that is not absorbed leaves if the scales are not tilted; else near to all. It is not reciprocal: the tilt and the
-/// attenuation are those of `wo`.
+/// All light that is not absorbed leaves if the scales are not tilted; else near to all. It is not reciprocal: the tilt
+/// and the attenuation are those of `wo`.
 ///
-/// Sources: M. J.-Y. Chiang, B. Bitterli, C. Tappan, B. Burley, "A Practical and Controllable Hair and Fur Model for Production Path
-/// Tracing", Computer Graphics Forum 35(2), 2016, in the form of M. Pharr, W. Jakob, G. Humphreys, "Physically Based Rendering", 4th
-/// edition, 2023, section 9.9; E. d'Eon and others, "An Energy-Conserving Hair Reflectance Model", EGSR 2011; S. R. Marschner,
-/// H. W. Jensen, M. Cammarano, S. Worley, P. Hanrahan, "Light Scattering from Human Hair Fibers", SIGGRAPH 2003. There, Bessel's function
-/// is approximated such that up to 0.35 % of the light is lost; here it is not.
+/// Sources: M. J.-Y. Chiang, B. Bitterli, C. Tappan, B. Burley, "A Practical and Controllable Hair and Fur Model for
+/// Production Path Tracing", Computer Graphics Forum 35(2), 2016, in the form of M. Pharr, W. Jakob, G. Humphreys,
+/// "Physically Based Rendering", 4th edition, 2023, section 9.9; E. d'Eon and others, "An Energy-Conserving Hair
+/// Reflectance Model", EGSR 2011; S. R. Marschner, H. W. Jensen, M. Cammarano, S. Worley, P. Hanrahan, "Light
+/// Scattering from Human Hair Fibers", SIGGRAPH 2003. There, Bessel's function is approximated such that up to 0.35 %
+/// of the light is lost; here it is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hair {
     /// The absorption, per radius.
@@ -123,8 +127,8 @@ pub struct Hair {
 }
 
 impl Hair {
-    /// By absorption, place, index of refraction, the roughness along and around the fibre, both clamped to [0.01, 1], and the tilt of the
-    /// scales in degrees.
+    /// By absorption, place, index of refraction, the roughness along and around the fibre, both clamped to [0.01, 1],
+    /// and the tilt of the scales in degrees.
     pub fn new(absorption: Spectrum, h: f32, eta: f32, beta_m: f32, beta_n: f32, alpha: f32) -> Self {
         let (m, n) = (roughness(beta_m), roughness(beta_n));
         // By powers that are the same on all machines.
@@ -371,7 +375,8 @@ fn bessel<R: Real>(x: R) -> R {
 
 /// The density along the fibre, by sines and cosines of both angles.
 ///
-/// exp(−sᵢ sₒ / v) I₀(cᵢ cₒ / v) / (2 v sinh(1/v)), with the exponents joined: cᵢ cₒ − sᵢ sₒ − 1 is half of a square of a length.
+/// exp(−sᵢ sₒ / v) I₀(cᵢ cₒ / v) / (2 v sinh(1/v)), with the exponents joined: cᵢ cₒ − sᵢ sₒ − 1 is half of a square of
+/// a length.
 #[inline(always)]
 fn along<R: Real>([sin_i, cos_i]: [R; 2], [sin_o, cos_o]: [R; 2], v: R) -> R {
     let (x, y) = (cos_i - cos_o, sin_i + sin_o);

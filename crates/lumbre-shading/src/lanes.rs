@@ -1,8 +1,8 @@
 //! BSDFs over lanes: each kind is written once over [`Real`], and the scalar [`Bsdf`] is its `f32` instance.
 //!
-//! A kind is loaded from rows of a table of numbers, which [`Bsdf::row`] writes; the lanes of one value may have rows of different surfaces,
-//! but of one kind. All results have the same bits at every instruction set. Directions are unit vectors in the local frame, whose z axis
-//! is the shading normal.
+//! A kind is loaded from rows of a table of numbers, which [`Bsdf::row`] writes; the lanes of one value may have rows
+//! of different surfaces, but of one kind. All results have the same bits at every instruction set. Directions are unit
+//! vectors in the local frame, whose z axis is the shading normal.
 
 use std::sync::Arc;
 
@@ -28,8 +28,8 @@ use crate::{Bsdf, BsdfSample, LocalDir, Scatter, Spectrum};
 /// The smallest cosine between a shading normal and the viewing direction.
 const MIN_SEEN: f32 = 1e-3;
 
-/// A shading normal, turned just far enough to be on the side of `towards` that the geometric normal is on; the geometric normal where that
-/// gives no direction.
+/// A shading normal, turned just far enough to be on the side of `towards` that the geometric normal is on; the
+/// geometric normal where that gives no direction.
 #[inline(always)]
 pub fn facing<R: Real>(normal: V3<R>, geometric: V3<R>, towards: V3<R>) -> V3<R> {
     let is_below = geometric.dot(towards).simd_lt(R::zero());
@@ -150,8 +150,8 @@ impl Bsdf {
         }
     }
 
-    /// The row from which [`LaneBsdf::load`] of its kind makes the same BSDF. That of a measured surface refers to the first of the tables;
-    /// [`Rows::push`] writes the right one.
+    /// The row from which [`LaneBsdf::load`] of its kind makes the same BSDF. That of a measured surface refers to the
+    /// first of the tables; [`Rows::push`] writes the right one.
     pub fn row(&self) -> Row {
         match self {
             Self::Diffuse(bsdf) => Row::from_slice(&bsdf.row()),

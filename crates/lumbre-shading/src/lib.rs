@@ -6,6 +6,7 @@
 
 mod albedo;
 mod bsdf;
+mod bsdf_sample;
 pub mod coated;
 mod coated_lanes;
 pub mod conductor;
@@ -35,7 +36,8 @@ pub mod thin_film;
 pub mod uber;
 mod uber_lanes;
 
-pub use bsdf::{Bsdf, BsdfSample, Scatter};
+pub use bsdf::Bsdf;
+pub use bsdf_sample::{BsdfSample, Scatter};
 pub use frame::{LocalDir, ShadingFrame, ShadingNormals};
 pub use material::{LocalSurface, Material, MaterialKind, Metal, Roughness};
 pub use medium::HomogeneousMedium;

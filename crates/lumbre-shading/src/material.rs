@@ -68,8 +68,8 @@ pub struct Material {
     pub normal_map: Option<ImageTexture>,
     /// Whether camera rays pass through its back. Light does not: it still casts shadows.
     pub one_sided: bool,
-    /// The index of refraction of a dielectric, or of a coat, by wavelength, which takes the place of its number where paths carry
-    /// wavelengths.
+    /// The index of refraction of a dielectric, or of a coat, by wavelength, which takes the place of its number where
+    /// paths carry wavelengths.
     pub dispersion: Option<Arc<SpectrumValue>>,
 }
 
@@ -303,7 +303,11 @@ impl Material {
                     rest.extend(materials.iter().map(|material| &**material));
                     amount.is_constant()
                 }
-                _ => false,
+                MaterialKind::CoatedConductor { .. }
+                | MaterialKind::DiffuseTransmission { .. }
+                | MaterialKind::Hair(_)
+                | MaterialKind::Subsurface(_)
+                | MaterialKind::Pov(_) => false,
             };
             if !is_uniform || material.displacement.is_some() || material.normal_map.is_some() {
                 return false;
@@ -339,7 +343,14 @@ impl Material {
             MaterialKind::Principled(params) => params.is_transmissive(),
             MaterialKind::Uber(params) => params.is_transmissive(),
             MaterialKind::Pov(material) => material.is_transmissive(),
-            _ => false,
+            MaterialKind::Diffuse { .. }
+            | MaterialKind::Conductor { .. }
+            | MaterialKind::ConductorReflectance { .. }
+            | MaterialKind::CoatedDiffuse { .. }
+            | MaterialKind::CoatedConductor { .. }
+            | MaterialKind::Measured(_)
+            | MaterialKind::Mix { .. }
+            | MaterialKind::Interface => false,
         })
     }
 
@@ -351,11 +362,22 @@ impl Material {
             MaterialKind::Principled(params) => params.has_delta_transmission(),
             MaterialKind::Uber(params) => params.has_delta_transmission(),
             MaterialKind::Pov(material) => material.has_delta_transmission(),
-            _ => false,
+            MaterialKind::Diffuse { .. }
+            | MaterialKind::Conductor { .. }
+            | MaterialKind::ConductorReflectance { .. }
+            | MaterialKind::CoatedDiffuse { .. }
+            | MaterialKind::CoatedConductor { .. }
+            | MaterialKind::DiffuseTransmission { .. }
+            | MaterialKind::Hair(_)
+            | MaterialKind::Measured(_)
+            | MaterialKind::Subsurface(_)
+            | MaterialKind::Mix { .. }
+            | MaterialKind::Interface => false,
         })
     }
 
-    /// Whether [`Bsdf::specular`] may have any part anywhere on it: a mirror, smooth glass, a smooth coat; of a mixture, on any part.
+    /// Whether [`Bsdf::specular`] may have any part anywhere on it: a mirror, smooth glass, a smooth coat; of a
+    /// mixture, on any part.
     pub fn may_be_specular(&self) -> bool {
         self.has_part(|kind| match kind {
             MaterialKind::Conductor { roughness, .. }
@@ -457,8 +479,9 @@ impl Material {
     /// [`Material::bsdf`], with a clear coat oriented by its own normal map or, without one, by the surface
     /// without the base's bump map.
     ///
-    /// With [`ShadingNormals::Lumbre`] a normal that faces away from the visible side of the surface is turned back just
-    /// far enough: otherwise the silhouettes of coarse meshes with smooth normals, and steep bumps, would be black.
+    /// With [`ShadingNormals::Lumbre`] a normal that faces away from the visible side of the surface is turned back
+    /// just far enough: otherwise the silhouettes of coarse meshes with smooth normals, and steep bumps, would be
+    /// black.
     pub fn shading(
         &self,
         at: &TextureContext,
@@ -503,11 +526,26 @@ impl Material {
     /// world-space length: exp(−σ d) of the light remains after a distance d. `None` where nothing is absorbed,
     /// or light cannot get inside. The normal points out of the solid.
     ///
-    /// The caller tracks the distance travelled inside. Channels are those of linear Rec. 709, or the wavelengths that are given.
+    /// The caller tracks the distance travelled inside. Channels are those of linear Rec. 709, or the wavelengths that
+    /// are given.
     pub fn interior_attenuation(&self, wavelengths: Option<&Wavelengths>) -> Option<Spectrum> {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_attenuation(wavelengths),
-            _ => None,
+            MaterialKind::Diffuse { .. }
+            | MaterialKind::Conductor { .. }
+            | MaterialKind::ConductorReflectance { .. }
+            | MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::CoatedDiffuse { .. }
+            | MaterialKind::CoatedConductor { .. }
+            | MaterialKind::DiffuseTransmission { .. }
+            | MaterialKind::Uber(_)
+            | MaterialKind::Hair(_)
+            | MaterialKind::Measured(_)
+            | MaterialKind::Subsurface(_)
+            | MaterialKind::Pov(_)
+            | MaterialKind::Mix { .. }
+            | MaterialKind::Interface => None,
         }
     }
 
@@ -521,7 +559,20 @@ impl Material {
                 params.interior_medium(at.spectral.as_ref().map(|spectral| &spectral.wavelengths))
             }
             MaterialKind::Subsurface(params) => Some(params.medium(at)),
-            _ => None,
+            MaterialKind::Diffuse { .. }
+            | MaterialKind::Conductor { .. }
+            | MaterialKind::ConductorReflectance { .. }
+            | MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::CoatedDiffuse { .. }
+            | MaterialKind::CoatedConductor { .. }
+            | MaterialKind::DiffuseTransmission { .. }
+            | MaterialKind::Uber(_)
+            | MaterialKind::Hair(_)
+            | MaterialKind::Measured(_)
+            | MaterialKind::Pov(_)
+            | MaterialKind::Mix { .. }
+            | MaterialKind::Interface => None,
         }
     }
 
@@ -544,7 +595,20 @@ impl Material {
         self.has_part(|kind| match kind {
             MaterialKind::Principled(params) => params.interior_index().is_some(),
             MaterialKind::Subsurface(_) => true,
-            _ => false,
+            MaterialKind::Diffuse { .. }
+            | MaterialKind::Conductor { .. }
+            | MaterialKind::ConductorReflectance { .. }
+            | MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::CoatedDiffuse { .. }
+            | MaterialKind::CoatedConductor { .. }
+            | MaterialKind::DiffuseTransmission { .. }
+            | MaterialKind::Uber(_)
+            | MaterialKind::Hair(_)
+            | MaterialKind::Measured(_)
+            | MaterialKind::Pov(_)
+            | MaterialKind::Mix { .. }
+            | MaterialKind::Interface => false,
         })
     }
 
@@ -554,7 +618,20 @@ impl Material {
         match &self.kind {
             MaterialKind::Principled(params) => params.interior_index(),
             MaterialKind::Subsurface(params) => Some(index(params.eta)),
-            _ => None,
+            MaterialKind::Diffuse { .. }
+            | MaterialKind::Conductor { .. }
+            | MaterialKind::ConductorReflectance { .. }
+            | MaterialKind::Dielectric { .. }
+            | MaterialKind::ThinDielectric { .. }
+            | MaterialKind::CoatedDiffuse { .. }
+            | MaterialKind::CoatedConductor { .. }
+            | MaterialKind::DiffuseTransmission { .. }
+            | MaterialKind::Uber(_)
+            | MaterialKind::Hair(_)
+            | MaterialKind::Measured(_)
+            | MaterialKind::Pov(_)
+            | MaterialKind::Mix { .. }
+            | MaterialKind::Interface => None,
         }
     }
 
@@ -651,15 +728,16 @@ impl Material {
         Some(bsdf)
     }
 
-    /// The index of refraction at a place: that of the hero wavelength, where there are wavelengths and the index depends on them.
+    /// The index of refraction at a place: that of the hero wavelength, where there are wavelengths and the index
+    /// depends on them.
     fn index_at(&self, eta: f32, at: &TextureContext) -> f32 {
         let spectral = self.dispersion.as_ref().zip(at.spectral.as_ref());
         let of_hero = spectral.and_then(|(index, spectral)| index.at(spectral.wavelengths.nm()[0].into()));
         index(of_hero.map_or(eta, |eta| eta as f32))
     }
 
-    /// Whether it bends each wavelength by an index of its own, so that a path through it can follow the hero wavelength alone. Mixtures must
-    /// be resolved first.
+    /// Whether it bends each wavelength by an index of its own, so that a path through it can follow the hero
+    /// wavelength alone. Mixtures must be resolved first.
     pub fn disperses(&self) -> bool {
         match &self.kind {
             MaterialKind::Dielectric { .. }
@@ -702,8 +780,8 @@ impl Material {
         Self::new(MaterialKind::Dielectric { eta, roughness: Roughness::smooth() })
     }
 
-    /// What most things are made of, with the parameters of glTF's core: a base colour, from 0 for plastic to 1 for metal, and a
-    /// roughness, all in [0, 1].
+    /// What most things are made of, with the parameters of glTF's core: a base colour, from 0 for plastic to 1 for
+    /// metal, and a roughness, all in [0, 1].
     pub fn principled(base_color: Spectrum, metallic: f32, roughness: f32) -> Self {
         let number = |x: f32| Arc::new(FloatTexture::Constant(x));
         Self::new(MaterialKind::Principled(Box::new(PrincipledParams {

@@ -1,8 +1,9 @@
 //! Measured materials, as the files of the RGL material database tabulate them.
 //!
-//! Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering", SIGGRAPH Asia 2018. A BRDF is a table
-//! over a square that is warped so that samples lie where the material scatters most: its warp samples the normals of visible facets,
-//! estimated from backscattering. The tables depend on the direction towards the viewer, from which directions are sampled.
+//! Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering", SIGGRAPH
+//! Asia 2018. A BRDF is a table over a square that is warped so that samples lie where the material scatters most: its
+//! warp samples the normals of visible facets, estimated from backscattering. The tables depend on the direction
+//! towards the viewer, from which directions are sampled.
 
 mod table;
 
@@ -34,7 +35,8 @@ pub struct MeasuredParts {
     pub vndf: Vec<f32>,
     /// The brightness over the warped square, for each azimuth and angle of the viewer.
     pub luminance: Vec<f32>,
-    /// The colour over the warped square in linear Rec. 709, for each azimuth and angle of the viewer: all of red, of green and of blue.
+    /// The colour over the warped square in linear Rec. 709, for each azimuth and angle of the viewer: all of red, of
+    /// green and of blue.
     pub colours: [Vec<f32>; 3],
 }
 
@@ -51,8 +53,9 @@ pub struct MeasuredTables {
 }
 
 impl MeasuredTables {
-    /// `None` where sizes do not fit: angles that are missing or do not ascend, fewer than two rows or columns, or tables that do not
-    /// have a slice for each direction of the viewer. Numbers must be finite, and none of the densities negative.
+    /// `None` where sizes do not fit: angles that are missing or do not ascend, fewer than two rows or columns, or
+    /// tables that do not have a slice for each direction of the viewer. Numbers must be finite, and none of the
+    /// densities negative.
     pub fn new(parts: MeasuredParts) -> Option<Self> {
         let MeasuredParts { theta_i, phi_i, size, ndf, sigma, vndf, luminance, colours: [red, green, blue] } =
             parts;
@@ -179,7 +182,8 @@ pub struct Measured {
     pub nm: Option<[f32; 3]>,
 }
 
-/// A colour at some wavelengths in nm: tables keep colours, which smooth spectra stand for; 0 in place of the first where there are none.
+/// A colour at some wavelengths in nm: tables keep colours, which smooth spectra stand for; 0 in place of the first
+/// where there are none.
 fn at_wavelengths(colour: Spectrum, nm: [f32; 3]) -> Spectrum {
     let most = 2.0 * colour.max_component();
     if nm[0] == 0.0 || most <= 0.0 {
@@ -237,7 +241,7 @@ impl Measured {
 /// The tables of all measured surfaces that lanes may read.
 pub type MeasuredList = Arc<Vec<Arc<MeasuredTables>>>;
 
-/// [`Measured`] over lanes, each of which is evaluated by itself: tables are looked up here and there.
+/// [`Measured`] over lanes. Each lane is evaluated separately, because table look-ups diverge.
 #[derive(Clone, Debug)]
 pub struct MeasuredLanes<R: Real> {
     /// Which of the tables, as a whole number.

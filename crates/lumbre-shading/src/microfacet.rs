@@ -96,7 +96,8 @@ impl Microfacets {
     }
 }
 
-/// [`Microfacets`] over lanes. Where they are smooth, only [`FacetLanes::is_smooth`] and [`FacetLanes::regularized`] mean anything.
+/// [`Microfacets`] over lanes. Where they are smooth, only [`FacetLanes::is_smooth`] and [`FacetLanes::regularized`]
+/// mean anything.
 #[derive(Clone, Copy, Debug)]
 pub struct FacetLanes<R: Real> {
     /// α along x; with `alpha_y` as [`Microfacets::new`] makes them: both zero or both positive.
@@ -129,7 +130,8 @@ impl<R: Real> FacetLanes<R> {
         (R::splat(PI) * self.alpha_x * self.alpha_y * h2 * h2).recip()
     }
 
-    /// |(α ∘ w.xy, w.z)|: Smith's auxiliary function is Λ(w) = (stretch(w) / |w.z| − 1) / 2. In terms of it nothing divides by a cosine, and grazing directions need no special case.
+    /// |(α ∘ w.xy, w.z)|: Smith's auxiliary function is Λ(w) = (stretch(w) / |w.z| − 1) / 2. In terms of
+    /// it nothing divides by a cosine, and grazing directions need no special case.
     #[inline(always)]
     fn stretch(&self, w: V3<R>) -> R {
         V3::new(self.alpha_x * w.x, self.alpha_y * w.y, w.z).length()

@@ -195,9 +195,9 @@ impl MipMap {
         }
     }
 
-    /// Greene and Heckbert, "Creating Raster Omnimax Images from Multiple Perspective Views Using the Elliptical Weighted
-    /// Average Filter", IEEE Computer Graphics and Applications 6(6), 1986; Heckbert, "Fundamentals of Texture Mapping and
-    /// Image Warping", Berkeley, 1989.
+    /// Greene and Heckbert, "Creating Raster Omnimax Images from Multiple Perspective Views Using the Elliptical
+    /// Weighted Average Filter", IEEE Computer Graphics and Applications 6(6), 1986; Heckbert, "Fundamentals of Texture
+    /// Mapping and Image Warping", Berkeley, 1989.
     fn elliptic<T: Texel>(&self, st: Vec2, dx: Vec2, dy: Vec2, max_ratio: f32) -> T {
         let (major, minor) = if dx.length_squared() >= dy.length_squared() { (dx, dy) } else { (dy, dx) };
         let max_ratio = if max_ratio >= 1.0 { max_ratio.min(64.0) } else { 1.0 };

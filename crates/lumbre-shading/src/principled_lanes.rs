@@ -84,8 +84,8 @@ impl<R: Real> ClearcoatLanes<R> {
         n.x.simd_ne(R::zero()) | n.y.simd_ne(R::zero()) | n.z.simd_ne(R::one())
     }
 
-    /// The rotation in a plane through the normal that takes the coat's normal to z: a half-turn about the bisector, then one about z;
-    /// their product fixes the axis.
+    /// The rotation in a plane through the normal that takes the coat's normal to z: a half-turn about the bisector,
+    /// then one about z; their product fixes the axis.
     #[inline(always)]
     fn local(&self, w: V3<R>) -> V3<R> {
         V3::select(self.leans(), about_z(self.about_bisector(w)), w)
@@ -114,8 +114,8 @@ impl<R: Real> ClearcoatLanes<R> {
         (self.weight * face).or_zero(exists)
     }
 
-    /// What the face reflects between two directions on the side that it is on, and the density of its samples. Where the coat leans,
-    /// some of its reflections are below the surface and are mirrored back up: both ways count.
+    /// What the face reflects between two directions on the side that it is on, and the density of its samples. Where
+    /// the coat leans, some of its reflections are below the surface and are mirrored back up: both ways count.
     #[inline(always)]
     fn eval(&self, wo: V3<R>, wi: V3<R>) -> (R, R) {
         let o = self.local(wo);
@@ -255,8 +255,8 @@ impl<R: Real> PrincipledLanes<R> {
         V3::select(has_film, lerp(bare, film, self.film.weight), bare)
     }
 
-    /// The reflectance of the dielectrics at a cosine, negative from the inside, for an index in each channel: interpolated between `f0`
-    /// and `f90` as the exact Fresnel equations vary.
+    /// The reflectance of the dielectrics at a cosine, negative from the inside, for an index in each channel:
+    /// interpolated between `f0` and `f90` as the exact Fresnel equations vary.
     #[inline(always)]
     pub(crate) fn dielectric(&self, cos: R, etas: [R; 3]) -> V3<R> {
         let exact = each_dielectric(cos, etas);
@@ -525,7 +525,8 @@ impl<R: Real> PrincipledLanes<R> {
         (tint * self.f90 * (one - self.film.weight)).or_zero(in_tables)
     }
 
-    /// f of multiple scattering between clear facets, of which perfect ones reflect these shares from both directions and in the mean.
+    /// f of multiple scattering between clear facets; perfect ones reflect these shares from both directions and on
+    /// average.
     #[inline(always)]
     fn clear_further_bounces(&self, wo: V3<R>, wi: V3<R>, mirrors: [R; 3]) -> V3<R> {
         let (zero, one, tiny) = (R::zero(), R::one(), R::splat(1e-6));
@@ -575,8 +576,8 @@ impl<R: Real> PrincipledLanes<R> {
         V3::new(c * w.x - s * w.y, s * w.x + c * w.y, w.z)
     }
 
-    /// f · |cos θi| of the facets, and the density of [`Self::sample_facets`]: the sum over the ways of scattering from `wo` to `wi`,
-    /// which are one, or one for each channel of a prism.
+    /// f · |cos θi| of the facets, and the density of [`Self::sample_facets`]: the sum over the ways of scattering from
+    /// `wo` to `wi`, which are one, or one for each channel of a prism.
     #[inline(always)]
     fn eval_facets(&self, wo: V3<R>, wi: V3<R>) -> (V3<R>, R) {
         let (zero, one) = (R::zero(), R::one());

@@ -1,10 +1,11 @@
 //! Skin, wax, milk: a dielectric boundary around a dense medium, through which light wanders.
 //!
-//! Light enters as into glass. Inside, a path takes steps through the medium ([`SubsurfaceParams::medium`]); at the boundary it is
-//! reflected back as Fresnel has it ([`SubsurfaceParams::reflected_inside`]), or leaves. What leaves is spread as even light from below the
-//! boundary would be, whatever way it came: after many collisions it has forgotten that, and so lights of any size can be sampled from the
-//! boundary. H. W. Jensen, S. Marschner, M. Levoy, P. Hanrahan ("A Practical Model for Subsurface Light Transport", SIGGRAPH 2001) spread it
-//! alike, but replace the way inside by a table of a flat, deep medium.
+//! Light enters as into glass. Inside, a path takes steps through the medium ([`SubsurfaceParams::medium`]); at the
+//! boundary it is reflected back as Fresnel has it ([`SubsurfaceParams::reflected_inside`]), or leaves. What leaves is
+//! spread as even light from below the boundary would be, whatever way it came: after many collisions it has forgotten
+//! that, and so lights of any size can be sampled from the boundary. H. W. Jensen, S. Marschner, M. Levoy, P. Hanrahan
+//! ("A Practical Model for Subsurface Light Transport", SIGGRAPH 2001) spread it alike, but replace the way inside by a
+//! table of a flat, deep medium.
 
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
@@ -95,12 +96,12 @@ impl SubsurfaceParams {
     }
 }
 
-/// The single-scattering albedo of a deep body of this asymmetry which gives back this share of the light that enters it head on, where its
-/// boundary reflects the share `back` of even light from inside.
+/// The single-scattering albedo of a deep body of this asymmetry which gives back this share of the light that enters
+/// it head on, where its boundary reflects the share `back` of even light from inside.
 ///
-/// Found by bisection of the reflectance of a half-space without a boundary, for light head on and for even light (B. Hapke, "Theory of
-/// Reflectance and Emittance Spectroscopy", 2nd ed., 2012, chapters 8 and 10), with the reflections at the boundary summed; asymmetry by
-/// similarity.
+/// Found by bisection of the reflectance of a half-space without a boundary, for light head on and for even light (B.
+/// Hapke, "Theory of Reflectance and Emittance Spectroscopy", 2nd ed., 2012, chapters 8 and 10), with the reflections
+/// at the boundary summed; asymmetry by similarity.
 fn albedo_of_body(reflectance: f32, back: f32, asymmetry: f32) -> f32 {
     let (wanted, back) = (f64::from(reflectance), f64::from(back));
     // By γ = √(1 − albedo), in which the share falls from 1 to 0.
@@ -126,8 +127,8 @@ fn albedo_of_body(reflectance: f32, back: f32, asymmetry: f32) -> f32 {
     (albedo / (1.0 - g + g * albedo)) as f32
 }
 
-/// The share of even light from outside that comes through a smooth boundary: 1 − 2 ∫ F(μ) μ dμ, by Simpson's rule over √(1 − μ), in
-/// which the integrand is smooth at grazing angles.
+/// The share of even light from outside that comes through a smooth boundary: 1 − 2 ∫ F(μ) μ dμ, by Simpson's rule over
+/// √(1 − μ), in which the integrand is smooth at grazing angles.
 fn transmitted_from_outside(eta: f32) -> f32 {
     const STEPS: usize = 64;
     let integrand = |i: usize| {
@@ -145,8 +146,8 @@ fn transmitted_from_outside(eta: f32) -> f32 {
     (2.0 * sum / (3.0 * STEPS as f64)) as f32
 }
 
-/// The boundary of such a body. From outside it is a [`Dielectric`]; of light from inside it is only told how it leaves, since who follows
-/// it has already chosen between leaving and [`SubsurfaceParams::reflected_inside`].
+/// The boundary of such a body. From outside it is a [`Dielectric`]; of light from inside it is only told how it
+/// leaves, since who follows it has already chosen between leaving and [`SubsurfaceParams::reflected_inside`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Subsurface {
     /// The boundary from outside.
@@ -195,7 +196,8 @@ pub struct SubsurfaceLanes<R: Real> {
 }
 
 impl<R: Real> SubsurfaceLanes<R> {
-    /// What leaves towards a direction outside, over that of a perfect diffuser: light in the denser medium counts η² more.
+    /// What leaves towards a direction outside, over that of a perfect diffuser: light in the denser medium counts η²
+    /// more.
     #[inline(always)]
     fn leaving(&self, wi: V3<R>) -> R {
         let eta = self.face.eta;
@@ -286,7 +288,8 @@ mod tests {
 
     #[test]
     fn even_light_passes_a_boundary_as_often_as_tables_say() {
-        // Egan and Hilgeman, "Optical Properties of Inhomogeneous Materials", 1979: 1 − 0.0664 for 1.33, 1 − 0.0918 for 1.5.
+        // Egan and Hilgeman, "Optical Properties of Inhomogeneous Materials", 1979: 1 − 0.0664 for 1.33, 1 − 0.0918 for
+        // 1.5.
         for (eta, reflected) in [(1.33, 0.0664), (1.5, 0.0918), (1.0, 0.0)] {
             let passes = transmitted_from_outside(eta);
             assert!((1.0 - passes - reflected).abs() < 1e-3, "{eta}: {passes}");

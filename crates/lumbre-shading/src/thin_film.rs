@@ -161,8 +161,8 @@ pub(crate) fn index_of<R: Real>(f0: R) -> R {
 const REC709_FROM_XYZ: [[f32; 3]; 3] =
     [[2.688_95, -1.275_71, -0.413_24], [-1.022_15, 1.978_32, 0.043_83], [0.061_21, -0.224_49, 1.163_28]];
 
-/// The lobes of the eye's sensitivity (X, Y, Z, and X again): Gaussians in the wave number, with the constants fitted by Belcour and
-/// Barla.
+/// The lobes of the eye's sensitivity (X, Y, Z, and X again): Gaussians in the wave number, with the constants fitted
+/// by Belcour and Barla.
 const PLACES: [f32; 4] = [1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6];
 const VARIANCES: [f32; 4] = [4.3278e9, 9.3046e9, 6.6121e9, 4.5282e9];
 /// The share of each of the two lobes of X: amplitudes 5.4856e-13 and 9.7470e-14, each times the root of its variance.

@@ -87,15 +87,16 @@ fn is_everywhere(texture: &SpectrumTexture, colour: Spectrum) -> bool {
     matches!(texture, SpectrumTexture::Constant(found) if albedo(*found) == colour)
 }
 
-/// α by a roughness of pbrt-v3, in [0, 1], with `remaproughness`. pbrt-v4 has the square root in its place, which is smaller: 0.32
-/// in place of 0.46 for a roughness of 0.1. Source: the polynomial in ln r of pbrt-v3's manual of its file format.
+/// α by a roughness of pbrt-v3, in [0, 1], with `remaproughness`. pbrt-v4 has the square root in its place, which is
+/// smaller: 0.32 in place of 0.46 for a roughness of 0.1. Source: the polynomial in ln r of pbrt-v3's manual of its
+/// file format.
 pub fn remapped_roughness(roughness: f32) -> f32 {
     let x = roughness.max(1e-3).logarithm();
     (((0.000_640_711 * x + 0.017_120_1) * x + 0.173_4) * x + 0.819_955) * x + 1.621_42
 }
 
-/// A sum of lobes that know nothing of each other, the same from both sides but for the index: Lambert, dielectric facets that
-/// only reflect, a mirror and a refraction by the same index, and light that goes straight on.
+/// A sum of lobes that know nothing of each other, the same from both sides but for the index: Lambert, dielectric
+/// facets that only reflect, a mirror and a refraction by the same index, and light that goes straight on.
 ///
 /// What the parameters give in sum may be more than what arrives, as in pbrt-v3: white Kd with white Ks makes light.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -124,7 +124,7 @@ impl<R: Real> LaneBsdf<R> for UberLanes<R> {
     fn sample(&self, wo: V3<R>, lobe: R, u: [R; 2]) -> LaneSample<R> {
         let probabilities = self.probabilities(wo);
         let none = R::Mask::splat(false);
-        // By rounding the probabilities may sum to less than `lobe`: then it is the last one of those that there are.
+        // By rounding the probabilities may sum to less than `lobe`: then it is the last one that exists.
         let mut chosen = [none; 5];
         let (mut rest, mut found, mut after) = (lobe, none, none);
         for i in 0..5 {

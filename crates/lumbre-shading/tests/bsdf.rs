@@ -1,9 +1,9 @@
 //! What every BSDF promises: it samples what its density says, its weights are values over densities, it is reciprocal
 //! (radiance in a denser medium counted by η²), it makes no energy, and it never answers NaN.
 //!
-//! Teeth: with the density of rough metal or glass multiplied by 1.005 the test of densities fails; with the Jacobian of
-//! refraction taken the wrong way round those of densities, weights and reciprocity do; with η² left out of the values of
-//! a transmission those of weights and reciprocity.
+//! Teeth: with the density of rough metal or glass multiplied by 1.005 the test of densities fails; with the Jacobian
+//! of refraction taken the wrong way round those of densities, weights and reciprocity do; with η² left out of the
+//! values of a transmission those of weights and reciprocity.
 
 use std::f64::consts::{PI, TAU};
 use std::marker::PhantomData;
@@ -765,7 +765,7 @@ fn no_surface_makes_light() {
     for (number, (name, bsdf)) in all().into_iter().enumerate() {
         for (v, wo) in some_views(number) {
             let (share, error) = match &bsdf {
-                // Along the surface a few directions carry most of the light: there it takes more samples to tell.
+                // Along the surface a few directions carry most of the light: there it takes more samples to decide.
                 Bsdf::Principled(bsdf) => Some(even_furnace(bsdf, wo, GRID))
                     .filter(|(_, error)| *error < 0.1)
                     .unwrap_or_else(|| even_furnace(bsdf, wo, [16, 128])),
@@ -1230,7 +1230,8 @@ struct Columns {
 }
 
 impl Columns {
-    /// The row of each lane is one of the BSDFs'; directions are of all kinds, samples of theirs and such that have no side among them.
+    /// The row of each lane is one of the BSDFs'; directions are of all kinds, samples of theirs and such that have no
+    /// side among them.
     fn new(bsdfs: &[Bsdf], count: usize, seed: u64) -> Self {
         let mut table = Rows::default();
         (0..5).for_each(|_| {

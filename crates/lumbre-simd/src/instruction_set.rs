@@ -57,8 +57,9 @@ impl InstructionSet {
 
     /// The best that this machine has and the environment allows. The first call looks, all others remember.
     ///
-    /// The environment variable `LUMBRE_SIMD` limits it: `scalar`, `neon`, `avx2` or `avx512` is the best that may be chosen. A value that
-    /// names none of these limits nothing; a program reports it by [`InstructionSet::from_environment`].
+    /// The environment variable `LUMBRE_SIMD` limits it: `scalar`, `neon`, `avx2` or `avx512` is the best that may be
+    /// chosen. A value that names none of these limits nothing; a program reports it by
+    /// [`InstructionSet::from_environment`].
     pub fn detect() -> Self {
         static BEST: OnceLock<InstructionSet> = OnceLock::new();
         *BEST.get_or_init(|| Self::from_environment().unwrap_or_else(|_| best_up_to(usize::MAX)))
@@ -167,8 +168,8 @@ fn best_up_to(lanes: usize) -> InstructionSet {
     fits.unwrap_or(InstructionSet::SCALAR)
 }
 
-/// The type beside which a job is compiled: the compiler puts a generic method into the codegen unit of its type, so that the jobs of
-/// different modules are compiled in parallel.
+/// The type with which a job is compiled: the compiler puts a generic method into the codegen unit of its type, so that
+/// the jobs of different modules are compiled in parallel.
 trait CompilationUnit: Job + Sized {
     #[inline(never)]
     fn run_scalar(self) -> Self::Output {

@@ -106,8 +106,8 @@ pub trait UInt:
     /// If the index of any lane is outside of the table, or not below 2³¹.
     fn gather(table: &[u32], index: Self) -> Self;
 
-    /// Writes the lanes of the mask to the start of a slice, in order and without gaps. What follows them, up to the number of lanes, is
-    /// unspecified.
+    /// Writes the lanes of the mask to the start of a slice, in order and without gaps. What follows them, up to the
+    /// number of lanes, is unspecified.
     ///
     /// # Panics
     /// If the slice has no room for all lanes.
@@ -124,7 +124,7 @@ pub trait UInt:
         lanes
     }
 
-    /// As many of these as there are lanes.
+    /// A vector of the same number of lanes.
     #[inline(always)]
     fn from_lanes(lanes: &[u32; MAX_LANES]) -> Self {
         Self::from_slice(lanes)
@@ -211,8 +211,8 @@ pub trait Double:
     /// If the index of any lane is outside of the table, or not below 2³¹.
     fn gather(table: &[f64], index: Self::UInt) -> Self;
 
-    /// Writes the lanes of the mask to the start of a slice, in order and without gaps. What follows them, up to the number of lanes, is
-    /// unspecified.
+    /// Writes the lanes of the mask to the start of a slice, in order and without gaps. What follows them, up to the
+    /// number of lanes, is unspecified.
     ///
     /// # Panics
     /// If the slice has no room for all lanes.
@@ -221,8 +221,8 @@ pub trait Double:
     /// The absolute value of this with the sign of `sign`.
     fn copysign(self, sign: Self) -> Self;
 
-    /// The next representable number in the direction of the sign of `along`: [`f64::next_up`] where that is positive, [`f64::next_down`]
-    /// where it is negative. The number itself where `along` is 0 or NaN.
+    /// The next representable number in the direction of the sign of `along`: [`f64::next_up`] where that is positive,
+    /// [`f64::next_down`] where it is negative. The number itself where `along` is 0 or NaN.
     fn next_towards_sign(self, along: Self) -> Self;
 
     /// All lanes, and zeros up to [`MAX_LANES`].
@@ -233,7 +233,7 @@ pub trait Double:
         lanes
     }
 
-    /// As many of these as there are lanes.
+    /// A vector of the same number of lanes.
     #[inline(always)]
     fn from_lanes(lanes: &[f64; MAX_LANES]) -> Self {
         Self::from_slice(lanes)
@@ -352,15 +352,15 @@ pub trait Real:
     /// If the index of any lane is outside of the table, or not below 2³¹.
     fn gather(table: &[f32], index: Self::UInt) -> Self;
 
-    /// Writes the lanes of the mask to the start of a slice, in order and without gaps. What follows them, up to the number of lanes, is
-    /// unspecified.
+    /// Writes the lanes of the mask to the start of a slice, in order and without gaps. What follows them, up to the
+    /// number of lanes, is unspecified.
     ///
     /// # Panics
     /// If the slice has no room for all lanes.
     fn compress_store(self, mask: Self::Mask, slice: &mut [f32]);
 
-    /// Runs a task by a call instead of inlining it; the called function has the instruction set, too. For code that is long and used in
-    /// several places: inlined in each it would compile for minutes.
+    /// Runs a task by a call instead of inlining it; the called function has the instruction set, too. For code that is
+    /// long and used in several places: inlined in each it would compile for minutes.
     fn call<T: Task<Self>>(task: T) -> T::Output;
 
     /// 0 in all lanes.
@@ -408,7 +408,7 @@ pub trait Real:
         lanes
     }
 
-    /// As many of these as there are lanes.
+    /// A vector of the same number of lanes.
     #[inline(always)]
     fn from_lanes(lanes: &[f32; MAX_LANES]) -> Self {
         Self::from_slice(lanes)

@@ -1,7 +1,7 @@
 //! Elementary functions and warps over lanes, with the same bits at every width.
 //!
-//! Error bounds are against exact results, for the arguments named; an ulp is a unit in the last place of the result. Polynomials
-//! interpolate at Chebyshev nodes.
+//! Error bounds are against exact results, for the arguments named; an ulp is a unit in the last place of the result.
+//! Polynomials interpolate at Chebyshev nodes.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, LOG2_E, PI, SQRT_2};
 
@@ -42,8 +42,8 @@ pub fn sin_cos_turns<R: Real>(turns: R) -> (R, R) {
     (R::from_bits(a.to_bits() ^ sin_sign), R::from_bits(b.to_bits() ^ cos_sign))
 }
 
-/// The angle of the point (x, y) from the x axis, in [−π, π] with the sign of `y`: to 4e-7. As IEEE 754 has it, −0 of `x` is on the
-/// negative side; but NaN where both are infinite.
+/// The angle of the point (x, y) from the x axis, in [−π, π] with the sign of `y`: to 4e-7. As IEEE 754 has it, −0 of
+/// `x` is on the negative side; but NaN where both are infinite.
 #[inline(always)]
 pub fn atan2<R: Real>(y: R, x: R) -> R {
     let (width, height) = (x.abs(), y.abs());
@@ -140,7 +140,8 @@ pub fn pow<R: Real>(x: R, y: R) -> R {
 
 /// Two unit vectors that complete the unit vector `n` to a right-handed frame, `e1 × e2 = n`.
 ///
-/// Source: Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017.
+/// Source: Duff, Burgess, Christensen, Hery, Kensler, Liani, Villemin, "Building an Orthonormal Basis, Revisited", JCGT
+/// 6(1), 2017.
 #[inline(always)]
 pub fn orthonormal_basis<R: Real>(n: V3<R>) -> (V3<R>, V3<R>) {
     let sign = R::one().copysign(n.z);

@@ -8,7 +8,7 @@ use std::ops::{Add, BitAnd, BitOr, BitXor, Div, Mul, Neg, Not, Sub};
 use crate::indices::check_indices;
 use crate::{Double, Mask, Real, Task, UInt};
 
-/// A trait, so that each task is compiled beside its own type.
+/// A trait, so that each task is compiled with its own type.
 trait Called: Task<F32x4> {
     #[inline(never)]
     fn call_neon(self) -> Self::Output {

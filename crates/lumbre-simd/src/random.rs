@@ -44,7 +44,7 @@ mod tests {
             let mut other = words;
             other[i as usize % 4] ^= Wrapping(1 << (i / 4 % 32));
             for (a, b) in hash.into_iter().zip(pcg4d(other)) {
-                // The high bits, of which numbers are made.
+                // The high bits, from which numbers are made.
                 flipped += ((a ^ b).0 >> 8).count_ones();
                 count += 24;
             }

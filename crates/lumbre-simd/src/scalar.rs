@@ -261,7 +261,7 @@ impl Real for f32 {
     }
 }
 
-/// A trait, so that each task is compiled beside its own type.
+/// A trait, so that each task is compiled with its own type.
 trait Called: Task<f32> {
     #[inline(never)]
     fn run_called(self) -> Self::Output {

@@ -184,7 +184,8 @@ impl<R: Real> V3<R> {
     }
 }
 
-/// Of double precision. The methods have other names than those of single precision, since a type could be both to the compiler.
+/// Of double precision. The methods have other names than those of single precision, since a type could be both to the
+/// compiler.
 impl<D: Double> V3<D> {
     /// The same vector in all lanes.
     #[inline(always)]

@@ -34,8 +34,8 @@ struct Inputs {
     ints: [Vec<u32>; FEW],
 }
 
-/// A small generator of its own, since this crate depends on nothing: Steele, Lea, Flood, "Fast Splittable Pseudorandom Number
-/// Generators", OOPSLA 2014.
+/// A small generator of its own, since this crate depends on nothing: Steele, Lea, Flood, "Fast Splittable Pseudorandom
+/// Number Generators", OOPSLA 2014.
 fn next_random(state: &mut u64) -> u64 {
     *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (*state ^ *state >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,7 +1,7 @@
 //! Files that were dropped on the page, in one request: a folder of ours gets them, and nothing outside it.
 //!
-//! `LUMF`, the length of a list (four bytes, little-endian), the list as JSON (`[{"name": "a/b.obj", "size": 7}, …]`), and then the
-//! bytes of the files one after the other.
+//! `LUMF`, the length of a list (four bytes, little-endian), the list as JSON (`[{"name": "a/b.obj", "size": 7}, …]`),
+//! and then the bytes of the files one after the other.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -42,7 +42,7 @@ pub(crate) enum Refused {
 /// What was dropped.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Dropped {
-    /// A scene, with the files beside it.
+    /// A scene, with the files next to it.
     Scene(PathBuf),
     /// A picture of light from all around.
     Environment(PathBuf),
@@ -51,7 +51,7 @@ pub(crate) enum Dropped {
 /// Endings of pictures that may be environments.
 const PICTURES: [&str; 7] = ["hdr", "exr", "pfm", "png", "jpg", "jpeg", "tga"];
 
-/// Writes the files of a request into an empty folder, and tells which of them is to be shown.
+/// Writes the files of a request into an empty folder, and returns which of them to show.
 pub(crate) fn unpack(bytes: &[u8], folder: &Path) -> Result<Dropped, Refused> {
     let files = files(bytes)?;
     let names: Vec<&Path> = files.iter().map(|(name, _)| Path::new(name)).collect();
@@ -108,8 +108,8 @@ fn leads_inside(name: &str) -> bool {
     name.len() <= MAX_NAME && parts.len() <= MAX_DEPTH && parts.iter().all(|part| is_plain(part))
 }
 
-/// The scene among these files: of the formats that name others first, then of those that are named, the one in the outermost folder. Else
-/// the only picture.
+/// The scene among these files: first of formats that name other files, then of the named ones; the one in the
+/// outermost folder. Else the only picture.
 fn shown(names: &[&Path]) -> Option<Dropped> {
     let rank = |path: &Path| match SceneFormat::from_path(path)? {
         SceneFormat::Pbrt | SceneFormat::Pov => Some(0),

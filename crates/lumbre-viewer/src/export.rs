@@ -35,7 +35,7 @@ const FEATURE_SPP: u32 = 16;
 pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Result<(), SourceError> {
     refuse_foreign(folder)?;
     let read = source.read(&Moment::default())?;
-    // Nobody is there to tell more than what is in the page.
+    // Nothing can answer beyond what is in the page.
     let built = Built { explain: None, ..source.build(read.desc.clone(), &Hidden::default())? };
     let stage = Stage::new(built, &read.desc, read.warnings);
     let scene = stage.scene();

@@ -32,7 +32,7 @@ pub(crate) enum Refusal {
 /// The reply to a page that was admitted.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Welcome {
-    /// The keyed hash of "viewer" and the numbers of both sides, by the secret that the page has proved.
+    /// The keyed hash of "viewer" and the numbers of both sides, with the secret that the page knows.
     pub proof: String,
     /// The secret of the session, for a page that came with the token.
     pub session: Option<String>,
@@ -127,11 +127,11 @@ impl Guard {
 
     /// Whether a request comes from our page, or from no page at all. Requests that change something or open a socket
     /// must state their origin.
-    pub(crate) fn check_origin(&self, headers: &HeaderMap, must_say: bool) -> Result<(), Refusal> {
+    pub(crate) fn check_origin(&self, headers: &HeaderMap, origin_required: bool) -> Result<(), Refusal> {
         let host = single(headers, &HOST).ok_or(Refusal::Host)?;
         match single(headers, &ORIGIN) {
             Some(origin) if origin.strip_prefix("http://") == Some(host) => {}
-            None if !must_say && !headers.contains_key(ORIGIN) => {}
+            None if !origin_required && !headers.contains_key(ORIGIN) => {}
             _ => return Err(Refusal::Origin),
         }
         match headers.get(FETCH_SITE).map(|site| site.as_bytes()) {
@@ -160,7 +160,7 @@ impl Guard {
         self.keys.iter().find_map(admitted)
     }
 
-    /// A single-use address for an errand.
+    /// A single-use link to an answer that is fetched, or to an upload.
     pub(crate) fn ticket(&self, errand: Errand) -> Option<String> {
         let ticket = Secret::new().ok()?;
         let address = format!("/ticket/{}", ticket.digits());

@@ -31,8 +31,8 @@ pub(crate) const FILES: [File; 4] = [
 pub(crate) const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
      frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// What an explanation may: be in a frame of ours, have styles, run the one script that has this hash, and nothing else. It is of no
-/// origin.
+/// What an explanation may: be in a frame of ours, have styles, run the one script that has this hash, and nothing
+/// else. It is of no origin.
 pub(crate) fn explanation_policy(script: Option<&str>) -> String {
     let runs = script.map(|hash| format!("script-src '{hash}'; ")).unwrap_or_default();
     format!(

@@ -1,4 +1,5 @@
-//! HTTP on this machine: the page, the picture as a file, and the way to the socket. No path of a request reaches the file system.
+//! HTTP on this machine: the page, the picture as a file, and the way to the socket. No path of a request reaches the
+//! file system.
 
 use std::convert::Infallible;
 use std::net::{SocketAddr, TcpListener};

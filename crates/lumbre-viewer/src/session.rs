@@ -17,18 +17,18 @@ use crate::stage::{Explained, Stage};
 use crate::tree::{Hidden, MAX_NAMED};
 use crate::watching::Watched;
 
-/// Versions of the requested state, by the work that a change needs.
+/// Counters of changes, one for each kind of work that a change needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Changes {
-    /// The files are read.
+    /// Goes up when the files must be read again.
     pub read: u64,
-    /// The scene is built.
+    /// Goes up when the scene must be built again.
     pub build: u64,
-    /// The picture is begun.
+    /// Goes up when the picture must be rendered again.
     pub render: u64,
-    /// The picture is shown.
+    /// Goes up when the picture must be shown again.
     pub look: u64,
-    /// Pausing starts or ends.
+    /// Goes up when pausing starts or ends.
     pub pause: u64,
 }
 
@@ -39,7 +39,7 @@ pub(crate) struct Wanted {
     /// The last change of the camera, as counted by the page.
     pub sequence: u32,
     pub camera: usize,
-    /// Its moved placement; `None` for the file's own camera.
+    /// Where the user moved the camera; `None` for the file's own place.
     pub moved: Option<Moved>,
     pub channel: Channel,
     pub scale: f64,
@@ -91,7 +91,7 @@ struct Inner {
     name: String,
 }
 
-/// What all parts of a viewer share.
+/// State shared by server and worker.
 pub(crate) struct Session {
     inner: Mutex<Inner>,
     changed: Condvar,
@@ -258,7 +258,8 @@ impl Session {
         }
     }
 
-    /// Sets the files to watch: those that were read, or otherwise those watched before, and those of the source.
+    /// Sets the files to watch: the files that were read, or otherwise the previously watched ones, and those of the
+    /// source.
     pub(crate) fn watch_files(&self, read: Option<Vec<PathBuf>>, named: Vec<PathBuf>) {
         let mut watched = self.watched.lock().unwrap_or_else(PoisonError::into_inner);
         let before = read.unwrap_or_else(|| watched.files().collect());
@@ -428,7 +429,7 @@ impl Session {
             wanted.spp = wishes.spp.map(|spp| spp.clamp(1, 1 << 20)).or(wanted.spp);
             if let Some(noise) = wishes.noise.filter(|noise| noise.is_finite() && *noise >= 0.0) {
                 wanted.noise = Some(noise);
-                // As many samples as it takes, where nobody says how many.
+                // No limit on samples, unless one was given.
                 let most = Some(Stop::MAX_FOR_NOISE);
                 wanted.spp =
                     if noise > 0.0 { wanted.spp.or(most) } else { wanted.spp.filter(|_| wanted.spp != most) };
@@ -485,7 +486,7 @@ impl Session {
         Some(json!({ "type": "picked", "request": request, "x": x, "y": y, "ray": met }))
     }
 
-    /// How the colour of a pixel of the picture comes about, as a page in a language; `None` where nobody tells that.
+    /// The explanation of a pixel, as a page in a language; `None` if there is no explainer.
     pub(crate) fn explain(&self, pixel: (u32, u32), language: &str) -> Option<Result<Explained, String>> {
         let (stage, camera, full) = self.shown()?;
         stage.explain(camera, full, pixel, language)

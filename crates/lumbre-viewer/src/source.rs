@@ -118,8 +118,8 @@ pub trait Source: Send + Sync {
     /// The needed and the available memory.
     fn check(&self, options: &RenderOptions) -> Result<(), SourceError>;
 
-    /// The source of a scene that came through the page, with its files, in a folder of its own. The scene may be a stranger's, so it may
-    /// use no file outside that folder.
+    /// The source of a scene that came through the page, with its files, in a folder of its own. The scene may be a
+    /// stranger's, so it may use no file outside that folder.
     fn of_folder(&self, folder: &Path, scene: &Path) -> Arc<dyn Source>;
 
     /// The same scene in the light of a picture from all around.

@@ -27,7 +27,8 @@ impl Hidden {
         Self { others: others && !shapes.is_empty(), shapes }
     }
 
-    /// Takes the hidden shapes out of a description. On a stage it is called when the stage is set, so that neither camera nor ground move.
+    /// Takes the hidden shapes out of a description. On a stage it is called when the stage is set, so that neither
+    /// camera nor ground move.
     pub fn apply(&self, desc: &mut SceneDesc) {
         if self.shapes.is_empty() {
             return;

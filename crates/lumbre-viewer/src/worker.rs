@@ -527,8 +527,8 @@ struct Shown {
     is_denoised: bool,
 }
 
-/// What a page is to hear while a pass goes on. It knows whether the picture is still wanted: a large one takes longer to put together
-/// than one may wait for the next.
+/// What a page is to hear while a pass goes on. It knows whether the picture is still wanted: a large one takes longer
+/// to put together than one may wait for the next.
 struct Telling<'s> {
     session: &'s Session,
     known: Changes,

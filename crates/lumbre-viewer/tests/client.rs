@@ -65,7 +65,7 @@ impl Source for OneFile {
     }
 }
 
-/// Tells which pixel it was asked of, in one language.
+/// Returns the pixel it was asked for, in one language.
 #[derive(Debug)]
 struct Words;
 
@@ -313,7 +313,7 @@ impl Socket {
         }
     }
 
-    /// Waits for a message of this kind of which something holds.
+    /// Waits for a message of this kind that meets a condition.
     pub(crate) fn wait_for(
         &mut self,
         kind: &str,

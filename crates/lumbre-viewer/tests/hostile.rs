@@ -91,7 +91,7 @@ fn hosts_and_origins_that_are_not_ours_are_refused() {
             count += 1;
         }
     }
-    // A socket, or a scene, without an origin; and pages of which the browser says that they are others.
+    // A socket, or a scene, without an origin; and pages that the browser marks as foreign.
     for path in ["/socket", "/scene"] {
         let method = if path == "/scene" { "POST" } else { "GET" };
         assert_eq!(viewer.status(method, path, &[format!("Host: {host}")]), 403);
@@ -334,7 +334,7 @@ fn who_looks_on_asks_and_changes_nothing_whatever_it_says() {
         let address = watcher.ticket(errand);
         assert_eq!(viewer.status("GET", &address, &lines), 200, "{errand}");
     }
-    // Nobody was told of a change: a page that comes now hears what was said before.
+    // No change was announced: a page that connects now gets the previous state.
     let now = viewer.socket(&own).wait_for("state", |_| true);
     assert_eq!(now, before);
     goes_on(&viewer, &own);
@@ -448,7 +448,8 @@ fn floods_end_and_idle_readers_block_nobody() {
 #[test]
 fn strangers_who_connect_and_say_nothing_lock_no_one_out() {
     let viewer = Running::new();
-    // More than there are places, of four kinds: silence, half a request, a request and no more, a socket without a greeting.
+    // More than there are places, of four kinds: silence, half a request, a request and no more, a socket without a
+    // greeting.
     let mut strangers = Vec::new();
     let mut add = |count: usize| {
         for i in 0..count {
@@ -484,7 +485,7 @@ fn strangers_who_connect_and_say_nothing_lock_no_one_out() {
     goes_on(&viewer, &session);
 }
 
-/// Bytes of memory in use, where the system tells.
+/// Bytes of memory in use, if the system reports it.
 fn memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;

@@ -1,6 +1,7 @@
 //! How long a tree of many hairs takes to build, what it weighs, and how many rays a second it answers.
 //!
-//! `cargo run --release -p lumbre --example curve_speed -- 1000000 1`: the number of hairs, and how often each segment is halved.
+//! `cargo run --release -p lumbre --example curve_speed -- 1000000 1`: the number of hairs, and how often each segment
+//! is halved.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example may")]
 

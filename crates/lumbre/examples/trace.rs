@@ -1,4 +1,5 @@
-//! A whole path tracer over Lumbre's rays: balls on a floor, matt and mirror, a small lamp and a sky: `cargo run --release --example trace`.
+//! A whole path tracer over Lumbre's rays: balls on a floor, matt and mirror, a small lamp and a sky: `cargo
+//! run --release --example trace`.
 //!
 //! The book goes through it line by line in "Your own ray tracer".
 

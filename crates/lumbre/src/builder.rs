@@ -66,8 +66,9 @@ impl ShapeBuilder {
         Self::of(Form::Geometry(geometry))
     }
 
-    /// Constructive solid geometry of two or more operands, each the union of its shapes. Shapes without a material or light take those of
-    /// the whole. In results, each shape counts in its place, and the whole has no number of its own.
+    /// Constructive solid geometry of two or more operands, each the union of its shapes. Shapes without a material or
+    /// light take those of the whole. In results, each shape counts in its place, and the whole has no number of its
+    /// own.
     ///
     /// ```
     /// use lumbre::description::CsgOperation;
@@ -150,7 +151,7 @@ impl SceneBuilder {
         self
     }
 
-    /// Adds shapes that stand together in as many places as there are maps, at the memory of one; none without a map.
+    /// Adds instances of a group of shapes, one for each map, at the memory of one; none without a map.
     ///
     /// ```
     /// use lumbre::geometry::Sphere;

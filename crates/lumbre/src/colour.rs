@@ -29,8 +29,8 @@ pub fn colour_names() -> impl Iterator<Item = &'static str> {
     NAMES.iter().map(|(name, _)| *name)
 }
 
-/// The colour of a name such as `navy`, or of three or six hexadecimal digits of sRGB such as `#fa0` or `#e8e0d8`, in linear light. `None` for
-/// other words.
+/// The colour of a name such as `navy`, or of three or six hexadecimal digits of sRGB such as `#fa0` or `#e8e0d8`, in
+/// linear light. `None` for other words.
 pub fn colour(text: &str) -> Option<Rgb> {
     let lower = text.to_ascii_lowercase();
     let named = || NAMES.iter().find(|(name, _)| *name == lower).map(|(_, code)| *code);

@@ -1,7 +1,7 @@
 //! What a scene consists of, before it is built: cameras, shapes, materials, lights, and how to set them on a stage.
 //!
-//! The names are those of the crate `lumbre-scene`, but for three that mean something else elsewhere here: [`ResolvedScene`] is its
-//! `Scene`, [`CameraView`] its `View` and [`DescriptionError`] its `BuildError`.
+//! The names are those of the crate `lumbre-scene`, but for three that mean something else elsewhere here:
+//! [`ResolvedScene`] is its `Scene`, [`CameraView`] its `View` and [`DescriptionError`] its `BuildError`.
 
 pub use lumbre_scene::light;
 pub use lumbre_scene::{

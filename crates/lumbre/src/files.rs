@@ -30,7 +30,8 @@ pub fn read_image_within(path: &Path, limits: Limits) -> Result<Image, Error> {
     Ok(file.to_image(&budget)?)
 }
 
-/// [`read_image_within`] of bytes from elsewhere, such as standard input, whose format they tell themselves; `name` is for messages.
+/// [`read_image_within`] of bytes from elsewhere, such as standard input, whose format is recognised by their content;
+/// `name` is for messages.
 ///
 /// # Errors
 /// [`Error::Format`].

@@ -35,7 +35,8 @@ pub struct SceneInfo {
 }
 
 impl SceneInfo {
-    /// Counts the contents of a description; bounds and trees are known only after building: see [`crate::Scene::info`].
+    /// Counts the contents of a description; bounds and trees are known only after building: see
+    /// [`crate::Scene::info`].
     pub fn of(desc: &SceneDesc) -> Self {
         let mut info = Self::default();
         let objects = || desc.objects.iter().flat_map(|object| &object.shapes);
@@ -89,8 +90,9 @@ impl SceneInfo {
     }
 }
 
-/// Bytes that building a scene of this description takes besides the description, as far as they can be told before: those of
-/// the trees and of what they are made from. Measured for meshes of a million triangles, which took 60 bytes each.
+/// Bytes that building a scene of this description takes besides the description, as far as they are known before:
+/// those of the trees and of what they are made from. Measured for meshes of a million triangles, which took 60 bytes
+/// each.
 pub fn predicted_build_bytes(desc: &SceneDesc) -> u64 {
     const TRIANGLE: u64 = 64;
     // Shapes and instances keep double precision, and their maps.

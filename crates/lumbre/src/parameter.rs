@@ -1,29 +1,29 @@
-//! Which parameters a description has that a [`crate::Setting`] can set, and what they are.
+//! The parameters of a description that a [`crate::Setting`] can set.
 
 use lumbre_image::Rgb;
 use lumbre_math::DVec3;
 use lumbre_scene::{LightDesc, SceneDesc};
 use lumbre_shading::Texture;
 
-use crate::setting::{Range, Slot, material_parameters, material_slot};
+use crate::setting::{Range, Slot, each_material_slot};
 
 /// A parameter of a description.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Parameter {
-    /// What stands before the `=` of a setting.
+    /// The part of a setting before its `=`.
     pub path: String,
-    /// What it belongs to, as people would call it: `material Wood (principled)`.
+    /// Its owner, for display: `material Wood (principled)`.
     pub owner: String,
     /// The last word of the path.
     pub name: String,
-    /// What values it takes.
+    /// The values that it takes.
     pub kind: ParameterKind,
-    /// Its numbers: one, three of a colour or a point; `None` where a texture stands.
+    /// Its value: one number, or three of a colour or a point; `None` for a texture.
     pub value: Option<Vec<f64>>,
 }
 
-/// What values a [`Parameter`] takes.
+/// The values that a [`Parameter`] takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ParameterKind {
@@ -31,7 +31,7 @@ pub enum ParameterKind {
     Number {
         /// The least.
         low: f64,
-        /// The greatest; infinite where there is none.
+        /// The greatest; infinite if there is none.
         high: f64,
     },
     /// A linear colour in [0, 1].
@@ -40,11 +40,11 @@ pub enum ParameterKind {
     Light,
     /// A point.
     Point,
-    /// A factor from 0 up, of what the file says.
+    /// A factor from 0 up on the value of the file.
     Factor,
 }
 
-/// The parameters of materials that are used or named, and of lights. Those that are other names of one are left out.
+/// The parameters of materials that are used or named, and of lights, each once, without aliases.
 pub fn parameters(desc: &SceneDesc) -> Vec<Parameter> {
     let mut all = Vec::new();
     for (index, material) in desc.materials.iter().enumerate() {
@@ -56,13 +56,16 @@ pub fn parameters(desc: &SceneDesc) -> Vec<Parameter> {
         let mut kind = material.material.kind.clone();
         let called = material.name.clone().unwrap_or_else(|| index.to_string());
         let owner = format!("material {called} ({})", kind.name());
-        let is_alias = |name: &&&str| matches!(**name, "uroughness" | "vroughness");
-        for name in material_parameters(&kind).iter().filter(|name| !is_alias(name)) {
-            let Some(slot) = material_slot(&mut kind, name) else { continue };
+        each_material_slot(&mut kind, &mut |names, slot| {
+            let name = names[0];
+            // `roughness` sets both.
+            if matches!(name, "uroughness" | "vroughness") {
+                return;
+            }
             let (kind, value) = described(slot);
             let path = format!("material.{called}.{name}");
-            all.push(Parameter { path, owner: owner.clone(), name: (*name).to_owned(), kind, value });
-        }
+            all.push(Parameter { path, owner: owner.clone(), name: name.to_owned(), kind, value });
+        });
     }
     for (index, light) in desc.lights.iter().enumerate() {
         let mut light = light;

@@ -20,19 +20,19 @@ const TRAILER: &[u8] = b"LUMBREPT";
 /// Bytes of a checksum.
 const CHECKSUM: usize = 32;
 
-/// Some samples of some pixels of a render, finished or not, and of which render they are: a checkpoint, a share of one machine of
-/// many, or what several such were merged to.
+/// Some samples of some pixels of a render, finished or not, and the identity of the render: a checkpoint, a share of
+/// one machine of many, or what several such were merged to.
 ///
 /// Parts of the same render come to the same bytes in whatever order and grouping they are merged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Of which render.
+    /// The identity of the render.
     pub job: Job,
     /// The sums of its samples.
     pub state: RenderState,
 }
 
-/// What makes a render the one that it is, but for which of its samples are taken, of which pixels, and when it stops.
+/// What identifies a render, apart from which samples of which pixels are taken and when it stops.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Job {
     /// All that a sample depends on, by name: the version of Lumbre, options, and a hash of every file that was read.
@@ -46,7 +46,8 @@ pub struct Job {
 }
 
 impl Job {
-    /// A render with these options of a scene that was read from these files. `settings` are what else the scene depends on, by name.
+    /// A render with these options of a scene that was read from these files. `settings` are what else the scene
+    /// depends on, by name.
     ///
     /// # Errors
     /// [`Error::Format`] for a file that cannot be read.
@@ -89,8 +90,8 @@ impl Job {
         Ok(Self { identity, shown: BTreeMap::new(), size, transparent: options.transparent })
     }
 
-    /// What a picture of some samples of every pixel says of itself: the version of Lumbre, a hash of all that the samples depend on,
-    /// the seed, the samples and the camera. The same for every run.
+    /// What a picture of some samples of every pixel says of itself: the version of Lumbre, a hash of all that the
+    /// samples depend on, the seed, the samples and the camera. The same for every run.
     pub fn metadata(&self, samples: &std::ops::Range<u32>) -> Vec<(String, String)> {
         let mut hasher = blake3::Hasher::new();
         for (name, value) in &self.identity {
@@ -222,7 +223,8 @@ impl<R: Read> Read for Hashed<R> {
 }
 
 impl Part {
-    /// Writes the bytes of a file of its own, and says how many. The sums are dropped as they are written, unless others share them.
+    /// Writes the bytes of a file of its own, and says how many. The sums are dropped as they are written, unless
+    /// others share them.
     ///
     /// # Errors
     /// Those of `out`.
@@ -253,7 +255,8 @@ impl Part {
         Self::read_from(&mut &bytes[..], bytes.len() as u64, most_memory)
     }
 
-    /// Reads `length` bytes, which may take `memory` bytes once unpacked. What is damaged is called that, and not what it seems to say.
+    /// Reads `length` bytes, which may take `memory` bytes once unpacked. What is damaged is called that, and not what
+    /// it seems to say.
     fn read_from(input: &mut dyn Read, length: u64, most_memory: u64) -> Result<Self, PartError> {
         let Some(body) = length.checked_sub(CHECKSUM as u64) else {
             let mut begin = vec![0; length as usize];
@@ -313,16 +316,17 @@ impl Part {
         Ok(part)
     }
 
-    /// Bytes of memory that a part may take whatever its size, and more for each byte of its file: a part of an honest render takes a
-    /// tenth of it.
+    /// Bytes of memory that a part may take whatever its size, and more for each byte of its file: a part of an honest
+    /// render takes a tenth of it.
     pub fn fair_memory(file_bytes: u64) -> u64 {
         const FREE: u64 = 64 << 20;
         const EACH: u64 = 32;
         FREE.saturating_add(file_bytes.saturating_mul(EACH))
     }
 
-    /// Reads a part from a file of its own, or from an .exr that holds one beside its picture. `most_memory` says how many bytes of memory
-    /// it may take, by the size of its file in bytes, and is asked before it is read: see [`Part::fair_memory`].
+    /// Reads a part from a `.part` file, or from an .exr that holds one with its picture. `most_memory` says how many
+    /// bytes of memory it may take, by the size of its file in bytes, and is asked before it is read: see
+    /// [`Part::fair_memory`].
     ///
     /// # Errors
     /// [`PartError`].
@@ -398,7 +402,7 @@ fn place(file: &mut File, size: u64) -> Result<(u64, u64), PartError> {
 }
 
 impl Picture {
-    /// Writes an .exr of the picture that holds a part beside it: other programs read the picture alone.
+    /// Writes an .exr of the picture that also holds a part: other programs read the picture alone.
     ///
     /// # Errors
     /// As [`Picture::save_with`].

@@ -35,8 +35,8 @@ impl Picture {
         &self.rendered.image
     }
 
-    /// A picture that was rendered before: its image (by its alpha, if it has coverage), its coverage by colour, and its features, of these
-    /// pixels of a whole of this size.
+    /// A picture that was rendered before: its image (by its alpha, if it has coverage), its coverage by colour, and
+    /// its features, of these pixels of a whole of this size.
     pub fn restored(
         image: Image,
         coverage: Option<Image>,
@@ -66,11 +66,13 @@ impl Picture {
         self.shown(None, &SaveOptions::default()).0
     }
 
-    /// Takes the noise out of the picture by Lumbre's own filter ([`lumbre_render::denoise`()]) on this many threads, 0 for one a core; the
-    /// same for any number. It keeps the noisy picture, which an .exr shows in channels of its own: `noisy.R` and so on.
+    /// Takes the noise out of the picture by Lumbre's own filter ([`lumbre_render::denoise`()]) on this many threads, 0
+    /// for one a core; the same for any number. It keeps the noisy picture, which an .exr shows in channels of its own:
+    /// `noisy.R` and so on.
     ///
     /// # Errors
-    /// [`Error::Options`] where [`crate::RenderOptions::guides`] were not asked for, and where not every pixel has a sample.
+    /// [`Error::Options`] where [`crate::RenderOptions::guides`] were not asked for, and where not every pixel has a
+    /// sample.
     pub fn denoise(&mut self, threads: usize) -> Result<(), Error> {
         self.denoise_unless(threads, &CancelToken::new())
     }
@@ -90,8 +92,8 @@ impl Picture {
         }
     }
 
-    /// Takes what a denoiser of this name made of [`Picture::image`] and [`Picture::coverage`] for the picture, and keeps the noisy one as
-    /// [`Picture::denoise`] does.
+    /// Takes what a denoiser of this name made of [`Picture::image`] and [`Picture::coverage`] for the picture, and
+    /// keeps the noisy one as [`Picture::denoise`] does.
     ///
     /// # Errors
     /// [`Error::Options`] where it is of another size, or has alpha and the picture none, or the other way round.
@@ -117,7 +119,8 @@ impl Picture {
         self.rendered.features.iter().find(|(kind, _)| *kind == feature).map(|(_, image)| image)
     }
 
-    /// What the film has besides colours: the channels that pbrt's films `gbuffer` and `spectral` have. An .exr file holds them too.
+    /// What the film has besides colours: the channels that pbrt's films `gbuffer` and `spectral` have. An .exr file
+    /// holds them too.
     pub fn film(&self) -> &FilmLayers {
         &self.rendered.film
     }
@@ -186,8 +189,9 @@ impl Picture {
         encoded.map_err(|e| Error::Options(format!("{}: {e}", format.name())))
     }
 
-    /// The picture over its background, as it is for displays, and what is left to be done to it: how [`Picture::encode`] begins
-    /// with a PNG. `shown.tone_map.encode(light, shown.exposure)` of a pixel, divided by its alpha, is what the PNG has there.
+    /// The picture over its background, as it is for displays, and what is left to be done to it: how
+    /// [`Picture::encode`] begins with a PNG. `shown.tone_map.encode(light, shown.exposure)` of a pixel, divided by its
+    /// alpha, is what the PNG has there.
     pub fn displayed(&self, options: &SaveOptions) -> (Cow<'_, Image>, SaveOptions) {
         self.shown(Some(ImageFormat::Png), options)
     }

@@ -28,7 +28,7 @@ pub struct Scene {
     build_time: Duration,
 }
 
-/// Darker surfaces tell little about the light on them.
+/// Darker surfaces say little about the light on them.
 const MIN_ALBEDO: f32 = 0.02;
 
 /// Opens a scene file: .pbrt (also .gz), .gltf, .glb, .obj, .ply or .stl. Warnings are dropped; [`open_with`]
@@ -117,8 +117,8 @@ impl Scene {
         self.resolved.accel().any(ray)
     }
 
-    /// [`Scene::closest`] for every ray, with the same answers. It works on the calling thread, and is soonest done with thousands
-    /// of rays at a time: see [`lumbre_kernel::Accel::closest_batch`].
+    /// [`Scene::closest`] for every ray, with the same answers. It works on the calling thread, and is soonest done
+    /// with thousands of rays at a time: see [`lumbre_kernel::Accel::closest_batch`].
     pub fn closest_batch(&self, rays: &[Ray]) -> Vec<Option<CastHit>> {
         let mut hits = vec![None; rays.len()];
         self.resolved.accel().closest_batch(rays, &mut hits);
@@ -142,8 +142,8 @@ impl Scene {
         self.resolved.accel().count(ray)
     }
 
-    /// The nearest point of all surfaces within `max_distance` (which may be infinite); `None` where there is none so near. Its
-    /// distance to triangles and exact shapes is right to the last digits.
+    /// The nearest point of all surfaces within `max_distance` (which may be infinite); `None` where there is none so
+    /// near. Its distance to triangles and exact shapes is right to the last digits.
     ///
     /// ```
     /// use lumbre::geometry::Sphere;
@@ -158,8 +158,8 @@ impl Scene {
     /// ```
     ///
     /// # Errors
-    /// [`Error::ClosestPointError`] where something may be nearer that has no answer: CSG, custom geometry without a method, or some
-    /// shapes under maps that do not keep angles.
+    /// [`Error::ClosestPointError`] where something may be nearer that has no answer: CSG, custom geometry without a
+    /// method, or some shapes under maps that do not keep angles.
     pub fn closest_point(&self, point: DVec3, max_distance: f64) -> Result<Option<CastPoint>, Error> {
         let nearest = self.resolved.accel().closest_point(point, max_distance)?;
         Ok(nearest.map(|nearest| CastPoint {
@@ -171,14 +171,14 @@ impl Scene {
         }))
     }
 
-    /// Whether a point is inside of what stands here, even-odd: where two bodies overlap it is outside again. What is open has no
-    /// inside, and the answer there is some guess, always the same one.
+    /// Whether a point is inside of what stands here, even-odd: where two bodies overlap it is outside again. What is
+    /// open has no inside, and the answer there is some guess, always the same one.
     pub fn is_inside(&self, point: DVec3) -> bool {
         self.resolved.accel().is_inside(point)
     }
 
-    /// How often surfaces wind around a point: 1 within a closed body, 0 without, the sum where bodies overlap, and a number in
-    /// between where a mesh is open. More than 0.5 is a good rule for "inside" where meshes have gaps.
+    /// How often surfaces wind around a point: 1 within a closed body, 0 without, the sum where bodies overlap, and a
+    /// number in between where a mesh is open. More than 0.5 is a good rule for "inside" where meshes have gaps.
     ///
     /// # Errors
     /// [`Error::WindingNumberError`] where there are open shapes other than meshes.
@@ -226,8 +226,8 @@ impl Scene {
         Ok(self.render_from(options, progress, cancel, None, None)?.0)
     }
 
-    /// Renders a picture, going on from what the same render gathered before, and hands out what it gathers: now and then to a
-    /// `keeper`, and at the end. The picture is that of a render without a break.
+    /// Renders a picture, going on from what the same render gathered before, and hands out what it gathers: now and
+    /// then to a `keeper`, and at the end. The picture is that of a render without a break.
     ///
     /// # Errors
     /// As for [`Scene::render`], and where the state is not that of such a render.
@@ -246,8 +246,8 @@ impl Scene {
         Ok((Picture { rendered, whole, background: None, noisy: None }, state))
     }
 
-    /// The sample of a pixel with this number, as a render takes it, with all that happens along its path: the radiance is that which
-    /// the render adds to the pixel, to the bit.
+    /// The sample of a pixel with this number, as a render takes it, with all that happens along its path: the radiance
+    /// is that which the render adds to the pixel, to the bit.
     ///
     /// # Errors
     /// As for [`Scene::render`].
@@ -260,8 +260,8 @@ impl Scene {
         Ok(lumbre_render::explain_sample(&self.resolved, options, pixel, index)?)
     }
 
-    /// An estimate of the light that arrives along a ray with a unit direction, and what happens along its path; the number chooses
-    /// among such estimates.
+    /// An estimate of the light that arrives along a ray with a unit direction, and what happens along its path; the
+    /// number chooses among such estimates.
     ///
     /// # Errors
     /// As for [`Scene::render`].
@@ -305,8 +305,8 @@ impl Scene {
         Ok(levels.get(levels.len() * 4 / 5).copied())
     }
 
-    /// Seconds that a sample of each pixel takes with these options, by rendering a small picture of the same view for a fraction of
-    /// a second. The first samples fill the processor's caches, so a long render takes a little less.
+    /// Seconds that a sample of each pixel takes with these options, by rendering a small picture of the same view for
+    /// a fraction of a second. The first samples fill the processor's caches, so a long render takes a little less.
     ///
     /// # Errors
     /// As for [`Scene::render`].
@@ -322,8 +322,8 @@ impl Scene {
         Ok(stats.elapsed.as_secs_f64() * pixels as f64 / stats.samples.max(1) as f64)
     }
 
-    /// An estimate of the share of all light from lamps on surfaces that the integrator `path` hardly finds and `caustics` does: see
-    /// [`lumbre_render::caustic_share`].
+    /// An estimate of the share of all light from lamps on surfaces that the integrator `path` hardly finds and
+    /// `caustics` does: see [`lumbre_render::caustic_share`].
     ///
     /// # Errors
     /// As for [`Scene::render`].
@@ -331,8 +331,8 @@ impl Scene {
         Ok(lumbre_render::caustic_share(&self.resolved, options)?)
     }
 
-    /// The same surfaces on another stage: those of a description that differs from this scene's in cameras, film and lights other than
-    /// shapes alone. Its shapes, materials and ground are not looked at; the tree is shared.
+    /// The same surfaces on another stage: those of a description that differs from this scene's in cameras, film and
+    /// lights other than shapes alone. Its shapes, materials and ground are not looked at; the tree is shared.
     ///
     /// ```
     /// use lumbre::description::{Camera, LightDesc};

@@ -2,8 +2,8 @@
 
 use std::fmt::Debug;
 
-/// The fields and values of options in words: `max_depth: 5` is `max depth 5`, and what is not set is `none`. Different options have
-/// different texts. It goes by what the type says of itself, so that no field is forgotten.
+/// The fields and values of options in words: `max_depth: 5` is `max depth 5`, and what is not set is `none`. Different
+/// options have different texts. It goes by what the type says of itself, so that no field is forgotten.
 pub fn in_words(options: &impl Debug) -> String {
     let text = format!("{options:?}");
     let mut out = String::with_capacity(text.len());

@@ -1,5 +1,5 @@
-//! What the words of a scene file mean for the picture: lights in their units, images the right way up, surfaces the right
-//! way round. Each scene is rendered, and each pixel compared with a closed form.
+//! What the words of a scene file mean for the picture: lights in their units, images the right way up, surfaces the
+//! right way round. Each scene is rendered, and each pixel compared with a closed form.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -72,7 +72,7 @@ fn floor(folder: Option<&Path>, light: &str) -> [f64; 3] {
         Translate {x} {y} {z}
         Shape "disk" "float radius" 40"#
     );
-    // Skies are found by two ways, each of which is noisy where the other is not.
+    // Skies are found by two strategies; each is noisy where the other is not.
     seen_by(2048, folder, r#""path" "integer maxdepth" 1"#, [x, y, z + 9.0], PLACE, &world)
 }
 
@@ -287,7 +287,8 @@ fn illuminance_is_that_of_the_upper_half_on_the_ground() {
     }
 }
 
-/// A square from (-2, -2, 0) to (2, 2, 0) about [`PLACE`], with (u, v) from (0, 0) to (1, 1), and other stuff before it.
+/// A square from (-2, -2, 0) to (2, 2, 0) about [`PLACE`], with (u, v) from (0, 0) to (1, 1), and other stuff before
+/// it.
 fn square(before: &str) -> String {
     let [x, y, z] = PLACE;
     format!(

@@ -1,7 +1,7 @@
-//! Scenes of pbrt beside their expected means, from closed forms and other programs, where their folder is present.
+//! pbrt scenes against their expected means, from closed forms and other programs, where their folder is present.
 //!
-//! Each row of its table is a part of a picture, its mean, and the standard error of that. A mean may be wrong by 0.3 % or what the row
-//! says, or by three standard errors of the row and four of its own, which are found of each pixel.
+//! Each row of its table is a part of a picture, its mean, and the standard error of that. A mean may be wrong by 0.3 %
+//! or what the row says, or by three standard errors of the row and four of its own, which are found of each pixel.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 use lumbre::Scene;
 use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
 
-/// Scenes that are not as expected yet, with paths of colours and with those of wavelengths. One that is has to be taken off.
+/// Scenes that are not as expected yet, with paths of colours and with those of wavelengths. One that is has to be
+/// taken off.
 const NOT_YET: [&[&str]; 2] = [
     // Negative lanes and reflectances above 1 are clipped; saturated colours are 0.45 % off.
     &["spectra-metals", "spectra-reflectance"],

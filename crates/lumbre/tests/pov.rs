@@ -1,7 +1,7 @@
-//! POV-Ray's scenes beside the pictures that POV-Ray makes of them, where their folder is present.
+//! POV-Ray's scenes against the pictures that POV-Ray renders of them, where their folder is present.
 //!
-//! A pixel differs by its largest channel. At most a share of the pixels may differ by more than 0.004, and the others on average by next
-//! to nothing: `cases/pov/EXPECTED.md` says how much.
+//! A pixel differs by its largest channel. At most a share of the pixels may differ by more than 0.004, and the others
+//! on average by next to nothing: `cases/pov/EXPECTED.md` says how much.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 

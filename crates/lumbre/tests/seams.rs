@@ -11,8 +11,9 @@ const A: Vec3 = Vec3::new(0.5, 1.25, -0.75);
 const STEP: Vec3 = Vec3::new(0.25, 0.125, 0.375);
 const INSIDE: DVec3 = DVec3::new(1.375, 0.6875, 1.125);
 
-/// A tetrahedron of the corners A, B, C and D. On one side of the edge from A to B is the triangle 0; on the other there is a vertex
-/// within it for each number of steps from A, of eight, and the faces are stitched to the edge by the triangles from 3 on.
+/// A tetrahedron of the corners A, B, C and D. On one side of the edge from A to B is the triangle 0; on the other
+/// there is a vertex within it for each number of steps from A, of eight, and the faces are stitched to the edge by the
+/// triangles from 3 on.
 fn stitched(stops: &[f32]) -> MeshDesc {
     let mut positions = vec![A, A + 8.0 * STEP, Vec3::new(3.0, -1.0, 0.5), Vec3::new(-0.5, 0.25, 2.5)];
     let mut triangles = vec![[0, 1, 2], [2, 1, 3], [0, 2, 3]];

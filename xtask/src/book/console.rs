@@ -5,7 +5,8 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-/// What is said of a block in the line that opens it: `console`, `console,head=20`, `console,result` or `console,varies`.
+/// What is said of a block in the line that opens it: `console`, `console,head=20`, `console,result` or
+/// `console,varies`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Example {
     /// How many lines of each output are shown, if not all.
@@ -43,8 +44,8 @@ impl Example {
         shown == other || (self.varies && without_numbers(shown) == without_numbers(other))
     }
 
-    /// The commands with what they print, or which line (from 0) is wrong and why. What `text` has between its commands is what they printed
-    /// before.
+    /// The commands with what they print, or which line (from 0) is wrong and why. What `text` has between its commands
+    /// is what they printed before.
     pub(crate) fn run(
         self,
         text: &str,
@@ -110,7 +111,8 @@ impl Example {
     }
 }
 
-/// The results among the lines that `lumbre math` prints: each begins with `=`, and goes on while its brackets are open.
+/// The results among the lines that `lumbre math` prints: each begins with `=`, and goes on while its brackets are
+/// open.
 fn results<'a>(lines: &[&'a str]) -> Vec<&'a str> {
     let mut shown = Vec::new();
     let mut open = 0_usize;
@@ -123,7 +125,8 @@ fn results<'a>(lines: &[&'a str]) -> Vec<&'a str> {
     shown
 }
 
-/// A text with a mark in place of each number, together with its unit where that is one of time: a slower run takes seconds in place of milliseconds.
+/// A text with a mark in place of each number, together with its unit where that is one of time: a slower run takes
+/// seconds in place of milliseconds.
 fn without_numbers(text: &str) -> String {
     let mut result = String::new();
     let mut rest = text;

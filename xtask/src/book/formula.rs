@@ -22,8 +22,8 @@ pub(crate) fn html(latex: &str, is_displayed: bool) -> Result<String> {
     Ok(if is_displayed { format!("<span class=\"formula\">{mathml}</span>") } else { mathml })
 }
 
-/// With bars that open before what they hold and close after it. Without a form, a bar within a row counts as one between two, and
-/// stands apart from both.
+/// With bars that open before what they hold and close after it. Without a form, a bar within a row counts as one
+/// between two, and stands apart from both.
 fn with_sided_bars(mathml: &str, latex: &str) -> Result<String> {
     const BAR: &str = ">|</mo>";
     let forms = latex.match_indices("vert").map(|(at, _)| match latex[..at].strip_suffix('r') {

@@ -1,4 +1,5 @@
-//! Files that pages show: the text of each stands in the page, below a comment that names it, so that the page is whole where it is read.
+//! Files that pages show: the text of each stands in the page, below a comment that names it, so that the page is whole
+//! where it is read.
 //!
 //! ````text
 //! <!-- include pictures/first.pbrt -->
@@ -15,8 +16,8 @@ use anyhow::{Context, Result};
 /// How the comment begins that names a file, relative to the page.
 const MARK: &str = "<!-- include ";
 
-/// A page of this name, in this folder, with the files that it shows as they are now. Its comments stay. A block of code that holds `{{#include FILE}}` and nothing else gets
-/// its comment here.
+/// A page of this name, in this folder, with the files that it shows as they are now. Its comments stay. A block of
+/// code that holds `{{#include FILE}}` and nothing else gets its comment here.
 pub(crate) fn expanded(name: &Path, folder: &Path, text: &str) -> Result<String> {
     let mut result = String::with_capacity(text.len());
     let mut lines = text.split_inclusive('\n').enumerate().peekable();

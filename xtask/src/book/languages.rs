@@ -1,5 +1,6 @@
-//! Pages in two languages: a page of `docs/es` is the page of `docs` with the same name, in Spanish. A test holds both to the same headings,
-//! formulas, commands, figures, exercises, tables and links; each has a link to the other below its title.
+//! Pages in two languages: a page of `docs/es` is the page of `docs` with the same name, in Spanish. A test holds both
+//! to the same headings, formulas, commands, figures, exercises, tables and links; each has a link to the other below
+//! its title.
 
 use std::fs;
 use std::path::Path;
@@ -138,7 +139,8 @@ mod tests {
         result
     }
 
-    /// The commands of a block of code, as they are in English. One that should be asked for Spanish and is not, or the reverse, is marked.
+    /// The commands of a block of code, as they are in English. One that should be asked for Spanish and is not, or the
+    /// reverse, is marked.
     fn commands(code: &str, is_shell: bool, is_spanish: bool) -> Vec<String> {
         let command = |line: &str| {
             let command = match line.strip_prefix("$ ") {
@@ -160,7 +162,8 @@ mod tests {
         code.lines().filter_map(command).collect()
     }
 
-    /// Where a link of a page leads, from the folder of the pages, without the folder of a language and without the place in the page.
+    /// Where a link of a page leads, from the folder of the pages, without the folder of a language and without the
+    /// place in the page.
     fn neutral(page: &Path, link: &str) -> String {
         match destination(page, link) {
             Some(target) => neutral_path(&target),

@@ -18,8 +18,8 @@ struct Links {
     targets: BTreeSet<String>,
 }
 
-/// All that is wrong with the links of the pages below `html`, which were made of `pages`. Links to elsewhere are looked at for their form
-/// only.
+/// All that is wrong with the links of the pages below `html`, which were made of `pages`. Links to elsewhere are
+/// looked at for their form only.
 pub(crate) fn check(html: &Path, pages: &Path) -> Result<Vec<String>> {
     let mut found = BTreeMap::new();
     for page in files::with_ending(html, "html")? {
@@ -100,7 +100,8 @@ fn decoded(text: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// The elements' names and the links of a page. It is made by mdbook, which quotes every attribute and closes every tag.
+/// The elements' names and the links of a page. It is made by mdbook, which quotes every attribute and closes every
+/// tag.
 fn links(html: &str) -> Links {
     let mut links = Links::default();
     let mut rest = html;

@@ -1,5 +1,6 @@
-//! Pages as they are read in the repository, and as mdbook takes them: files that they show and what their examples print are up to date in
-//! both; for mdbook formulas become MathML, pictures are rendered, and links that leave the book lead to the repository.
+//! Pages as they are read in the repository, and as mdbook takes them: files that they show and what their examples
+//! print are up to date in both; for mdbook formulas become MathML, pictures are rendered, and links that leave the
+//! book lead to the repository.
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -68,8 +69,8 @@ impl<'a> Preparer<'a> {
         Ok(Self { root, copy, program, pictures, kept, shown, update })
     }
 
-    /// Prepares every page, and says all that is wrong in them: also where the page of the repository is not up to date, unless it is brought up
-    /// to date. With `only`, those alone whose path contains one of them.
+    /// Prepares every page, and says all that is wrong in them: also where the page of the repository is not up to
+    /// date, unless it is brought up to date. With `only`, those alone whose path contains one of them.
     pub(crate) fn prepare_all(&self, only: &[String]) -> Result<Vec<Fault>> {
         let folder = self.copy.join(PAGES);
         let mut faults = Vec::new();
@@ -192,7 +193,8 @@ impl<'a> Preparer<'a> {
         Ok(shown)
     }
 
-    /// Renders a picture that has its scene beside it, and takes in one from outside the pages. Where it is then, if not where it was.
+    /// Renders a picture that has its scene next to it, and copies one from outside the pages. Returns its new path, if
+    /// it moved.
     fn image(&self, page: &Path, link: &str) -> Result<Option<String>> {
         let Some(file) = local_file(page, link) else { return Ok(None) };
         let (from, to) = (self.root.join(&file), self.copy.join(&file));
@@ -221,8 +223,8 @@ impl<'a> Preparer<'a> {
         Ok(Some(format!("{}{}", "../".repeat(up), inside.display())))
     }
 
-    /// Where a link leads in the book, if not where it says: to the repository, if it leaves the book; to the index that mdbook makes of
-    /// a README.
+    /// Where a link leads in the book, if not where it says: to the repository, if it leaves the book; to the index
+    /// that mdbook makes of a README.
     fn link(&self, page: &Path, link: &str) -> Result<Option<String>> {
         let Some(file) = local_file(page, link) else { return Ok(None) };
         if file.starts_with(PAGES) {

@@ -1,5 +1,5 @@
-//! Pictures of the book: each is rendered of the scene beside it, and again only where that or the program has changed. The repository keeps
-//! them small, for readers of the pages there.
+//! Pictures of the book: each is rendered from the scene next to it, and again only if that or the program has changed.
+//! The repository keeps them small, for readers of the pages there.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,7 +9,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-/// Renders pictures, or finds them among those that it has rendered.
+/// Renders pictures, or finds them in the cache.
 #[derive(Debug)]
 pub(crate) struct Pictures<'a> {
     pub(crate) program: &'a Path,
@@ -19,7 +19,8 @@ pub(crate) struct Pictures<'a> {
 }
 
 impl Pictures<'_> {
-    /// The picture of a scene, which may be rendered without a warning: but that it is of pbrt-v3, as what shows pbrt-v3's materials is.
+    /// The picture of a scene, which may be rendered without a warning: but that it is of pbrt-v3, as what shows
+    /// pbrt-v3's materials is.
     pub(crate) fn picture_of(&self, scene: &Path) -> Result<PathBuf> {
         let mut files = BTreeMap::new();
         read_with_named(scene, &mut files)?;
@@ -53,9 +54,9 @@ impl Pictures<'_> {
 
 /// Pixels across of a picture that the repository keeps.
 const SMALL: u32 = 256;
-/// The least samples of a pixel of it; a scene that asks for more than four times as many gets a quarter of them.
+/// The least samples of a pixel of it; a scene with more than four times this number gets a quarter of its own.
 const MIN_SMALL_SPP: u32 = 16;
-/// The file that says of which scenes the small pictures are, in the folder of the pages.
+/// The file that says from which scenes the small pictures were made, in the folder of the pages.
 const SUMS: &str = "pictures.sums";
 
 /// The small pictures of the repository: by name the sum of the scene that each was rendered of.
@@ -145,7 +146,7 @@ fn sum(scene: &Path) -> Result<String> {
     Ok(format!("{sum:016x}"))
 }
 
-/// The bytes of a file, and of those that it names in quotes, relative to itself.
+/// The bytes of a file, and of the files that it names in quotes, relative to itself.
 fn read_with_named(file: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) -> Result<()> {
     if files.contains_key(file) {
         return Ok(());

@@ -32,7 +32,7 @@ pub(super) struct Run {
 
 /// All of them.
 pub(super) struct Runs {
-    /// By rows: those that a program does by itself.
+    /// By rows: those that one program makes alone.
     pub(super) alone: Vec<(String, Vec<Run>)>,
     /// A checkpoint, and what goes on from it.
     pub(super) begun: Run,
@@ -65,7 +65,7 @@ impl Run {
     }
 }
 
-/// A file below the root, as programs are told of it.
+/// A file below the root, as passed to programs.
 fn relative(file: &Path) -> String {
     let file = file.strip_prefix(root()).unwrap_or(file);
     file.to_string_lossy().replace('\\', "/")

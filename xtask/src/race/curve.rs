@@ -19,9 +19,9 @@ pub(crate) struct TimeToError {
     pub(crate) measured: bool,
 }
 
-/// How long it takes to come to this error: between the points along the line that joins them on logarithmic axes, beyond them along
-/// the line by which independent samples go, half the error in twice the time. The points are in the order of their samples.
-/// `None` without points, or where one is not above zero.
+/// How long it takes to come to this error: between the points along the line that joins them on logarithmic axes,
+/// beyond them along the line by which independent samples go, half the error in twice the time. The points are in the
+/// order of their samples. `None` without points, or where one is not above zero.
 pub(crate) fn time_to_error(points: &[Point], error: f64) -> Option<TimeToError> {
     let all_positive = points.iter().all(|p| p.seconds > 0.0 && p.error > 0.0) && error > 0.0;
     let (first, last) = (points.first()?, points.last()?);

@@ -55,7 +55,8 @@ impl Kind {
         }
     }
 
-    /// Whether its picture of a scene tends to the one that Lumbre's tends to: all of its materials are the same functions.
+    /// Whether its picture of a scene tends to the one that Lumbre's tends to: all of its materials are the same
+    /// functions.
     pub(crate) fn agrees(self, scene: &Scene) -> bool {
         let same = |material: &Material| match self {
             Self::Lumbre => true,
@@ -145,7 +146,8 @@ fn own_python() -> PathBuf {
     folder().join("peers").join(inside)
 }
 
-/// Installs the peers that come as Python packages into an environment of the race's own. What cannot be installed is said.
+/// Installs the peers that come as Python packages into an environment of the race's own. What cannot be installed is
+/// said.
 pub(crate) fn install() -> Result<()> {
     let place = folder().join("peers");
     // Blender comes for one version of Python only.

@@ -43,7 +43,7 @@ const SIZE: u32 = 256;
 /// Samples a pixel.
 const SPP: u32 = 4;
 
-/// A kind of thing, of which scenes have more and more.
+/// A kind of thing, in growing numbers.
 struct Series {
     name: &'static str,
     counts: &'static [u32],

@@ -21,7 +21,8 @@ pub(crate) struct Scene {
     pub(crate) sky: Option<Sky>,
     pub(crate) volume: Option<Volume>,
     pub(crate) hair: Option<Hair>,
-    /// Whether most of what is interesting is light that comes through glass from a small lamp: programs that have an integrator for it use it.
+    /// Whether most of what is interesting is light that comes through glass from a small lamp: programs that have an
+    /// integrator for it use it.
     pub(crate) has_caustics: bool,
 }
 
@@ -85,7 +86,8 @@ pub(crate) struct Volume {
     pub(crate) high: Point,
     /// Voxels along x, y and z.
     pub(crate) cells: [usize; 3],
-    /// In their middles, x fastest, then y; 0 at the sides, so that programs need not agree on what is between the outermost voxels and the box.
+    /// In their middles, x fastest, then y; 0 at the sides, so that programs need not agree on what is between the
+    /// outermost voxels and the box.
     pub(crate) density: Vec<f32>,
     /// Extinction per length where the density is 1.
     pub(crate) extinction: f64,
@@ -215,8 +217,8 @@ impl Mesh {
         mesh
     }
 
-    /// A ring in an upright plane that is turned by `degrees`, knotted by waves, with the normals of the smooth surface: 4 * cells²
-    /// triangles.
+    /// A ring in an upright plane that is turned by `degrees`, knotted by waves, with the normals of the smooth
+    /// surface: 4 * cells² triangles.
     pub(crate) fn ring(centre: Point, radii: [f64; 2], degrees: f64, waves: f64, cells: u32) -> Self {
         use std::f64::consts::TAU;
         let (sin, cos) = degrees.to_radians().sin_cos();
@@ -240,8 +242,8 @@ impl Mesh {
         mesh
     }
 
-    /// A line of points (distance from the y axis, height) turned about that axis: 2 * cells triangles for each of its segments, half as many where
-    /// one ends on the axis. Their outer side is to the right of the line.
+    /// A line of points (distance from the y axis, height) turned about that axis: 2 * cells triangles for each of its
+    /// segments, half of that where one ends on the axis. Their outer side is to the right of the line.
     pub(crate) fn turned(line: &[[f64; 2]], cells: u32) -> Self {
         let mut mesh = Self::default();
         for &[radius, height] in line {

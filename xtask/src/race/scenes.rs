@@ -193,7 +193,7 @@ fn lights() -> Scene {
     parts.scene("lights", "A town under 10,000 small lamps of eight colours.", 3, camera)
 }
 
-/// Of twice as many triangles as there are cells.
+/// With two triangles per cell.
 pub(super) fn terrain(columns: u32, rows: u32) -> Scene {
     let mut parts = Parts::default();
     parts.add(
@@ -296,7 +296,8 @@ fn models() -> Scene {
     Scene { sky: Some(evening()), ..parts.scene("models", about, 5, camera) }
 }
 
-/// A glass with water in it, as closed boundaries between two media each: so no program needs to know which medium goes before another.
+/// A glass with water in it, as closed boundaries between two media each: so no program needs to know which medium goes
+/// before another.
 fn tumbler() -> Scene {
     let mut parts = Parts::default();
     parts.add(floor([-6.0, 6.0], 0.0, [-6.0, 6.0]), diffuse([0.6, 0.58, 0.52]));

@@ -1,11 +1,11 @@
-//! What rays hit, and what is at points, as the bytes of CSV, .npy or .npz.
+//! Answers of `lumbre cast` as the bytes of CSV, .npy or .npz.
 
 use std::fmt;
 use std::io::Write;
 
 use lumbre::{CastHit, CastPoint};
 
-/// The forms that answers can take.
+/// The format of answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Form {
     /// Comma-separated text with a header.
@@ -16,16 +16,16 @@ pub(super) enum Form {
     Npz,
 }
 
-/// What there is a line of for each answer.
+/// What an answer is; each is one line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Table {
-    /// A ray and what it hit, or nothing.
+    /// A ray and its hit, if any.
     Hits,
-    /// A ray and a number of this name.
+    /// A ray and a count of this name.
     Numbers(&'static str),
-    /// A point and the nearest point of all surfaces, or nothing.
+    /// A point and the nearest point of all surfaces, if any.
     Nearest,
-    /// A point and whether it is this.
+    /// A point and a boolean of this name.
     Flags(&'static str),
     /// A point and a real number of this name.
     Reals(&'static str),
@@ -63,11 +63,11 @@ impl Table {
     }
 }
 
-/// The bytes of some answers in a row.
+/// The bytes of consecutive answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Block {
     form: Form,
-    /// How many answers there are.
+    /// Number of answers.
     pub answers: u64,
     /// Lines, records, or the values of each array of a .npz.
     pub parts: Vec<Vec<u8>>,
@@ -80,33 +80,33 @@ impl Block {
         Self { form, answers: 0, parts: vec![Vec::new(); parts] }
     }
 
-    /// Adds what a ray hit, or nothing.
+    /// Adds the hit of a ray, if any.
     pub(super) fn push_hit(&mut self, ray: u64, hit: Option<&CastHit>) {
-        match self.form {
-            Form::Csv => push_line(&mut self.parts[0], ray, hit),
-            Form::Npy | Form::Npz => self.push_record(COLUMNS, ray, hit),
-        }
-        self.answers += 1;
+        self.push_columns(COLUMNS, ray, hit);
     }
 
-    /// Adds what is nearest to a point, or nothing.
+    /// Adds the nearest point, if any.
     pub(super) fn push_nearest(&mut self, point: u64, nearest: Option<&CastPoint>) {
-        match self.form {
-            Form::Csv => push_nearest_line(&mut self.parts[0], point, nearest),
-            Form::Npy | Form::Npz => self.push_record(NEAREST, point, nearest),
+        self.push_columns(NEAREST, point, nearest);
+    }
+
+    /// Adds an answer by its columns: a line, a record, or a value to each array.
+    fn push_columns<T>(&mut self, columns: &[Column<T>], number: u64, answer: Option<&T>) {
+        for (i, column) in columns.iter().enumerate() {
+            let value = (column.value)(number, answer);
+            match self.form {
+                Form::Csv => {
+                    value.push_text(&mut self.parts[0]);
+                    self.parts[0].push(if i + 1 < columns.len() { b',' } else { b'\n' });
+                }
+                Form::Npy => value.push_bytes(&mut self.parts[0]),
+                Form::Npz => value.push_bytes(&mut self.parts[i]),
+            }
         }
         self.answers += 1;
     }
 
-    /// The values of an answer: one after another, or each into its own array.
-    fn push_record<T>(&mut self, columns: &[Column<T>], number: u64, answer: Option<&T>) {
-        for (i, column) in columns.iter().enumerate() {
-            let part = if self.form == Form::Npz { i } else { 0 };
-            (column.bytes)(number, answer, &mut self.parts[part]);
-        }
-    }
-
-    /// Adds whether something holds of a point.
+    /// Adds a boolean of a point.
     pub(super) fn push_flag(&mut self, point: u64, holds: bool) {
         self.answers += 1;
         let out = &mut self.parts[0];
@@ -117,7 +117,7 @@ impl Block {
         }
     }
 
-    /// Adds a real number of a point, in CSV so that it reads back to the same bits.
+    /// Adds a real number of a point; in CSV it reads back to the same bits.
     pub(super) fn push_real(&mut self, point: u64, number: f64) {
         self.answers += 1;
         let out = &mut self.parts[0];
@@ -128,7 +128,7 @@ impl Block {
         }
     }
 
-    /// Adds a number of a ray.
+    /// Adds a count of a ray.
     pub(super) fn push_number(&mut self, ray: u64, number: u64) {
         self.answers += 1;
         let out = &mut self.parts[0];
@@ -145,44 +145,60 @@ fn push_text(out: &mut Vec<u8>, text: fmt::Arguments) {
     let _ = out.write_fmt(text);
 }
 
-fn push_line(out: &mut Vec<u8>, ray: u64, hit: Option<&CastHit>) {
-    let Some(hit) = hit else {
-        return push_text(out, format_args!("{ray},0,,,,,,,,,,,,,\n"));
-    };
-    push_text(out, format_args!("{ray},1"));
-    let (p, n, uv) = (hit.point, hit.normal, hit.uv);
-    // Debug prints the shortest decimal that reads back to the same bits.
-    for number in [hit.t, p.x, p.y, p.z, n.x, n.y, n.z, uv.x, uv.y] {
-        push_text(out, format_args!(",{number:?}"));
-    }
-    push_text(out, format_args!(",{},{},{},", u8::from(hit.front), hit.shape, hit.primitive));
-    if let Some(instance) = hit.instance {
-        push_text(out, format_args!("{instance}"));
-    }
-    out.push(b'\n');
-}
-
-fn push_nearest_line(out: &mut Vec<u8>, point: u64, nearest: Option<&CastPoint>) {
-    let Some(nearest) = nearest else {
-        return push_text(out, format_args!("{point},0,,,,,,,\n"));
-    };
-    push_text(out, format_args!("{point},1"));
-    let p = nearest.point;
-    for number in [nearest.distance, p.x, p.y, p.z] {
-        push_text(out, format_args!(",{number:?}"));
-    }
-    push_text(out, format_args!(",{},{},", nearest.shape, nearest.primitive));
-    if let Some(instance) = nearest.instance {
-        push_text(out, format_args!("{instance}"));
-    }
-    out.push(b'\n');
-}
-
-/// A column of the answers: its name, its NumPy type, and its little-endian bytes for one answer.
+/// A column of the answers: its name, and its value for one answer; `None` is a miss.
 struct Column<T> {
     name: &'static str,
-    kind: &'static str,
-    bytes: fn(u64, Option<&T>, &mut Vec<u8>),
+    value: fn(u64, Option<&T>) -> Value,
+}
+
+/// A value of an answer. `None`, in a miss, is empty in CSV.
+enum Value {
+    Count(u64),
+    /// False in NumPy's formats if there is none.
+    Flag(Option<bool>),
+    /// A number, or what NumPy's formats have for none.
+    Real(Result<f64, f64>),
+    /// -1 in NumPy's formats if there is none.
+    Index(Option<u32>),
+}
+
+impl Value {
+    /// The NumPy type.
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Count(_) => "<u8",
+            Self::Flag(_) => "|b1",
+            Self::Real(_) => "<f8",
+            Self::Index(_) => "<i8",
+        }
+    }
+
+    fn push_bytes(self, out: &mut Vec<u8>) {
+        match self {
+            Self::Count(number) => out.extend(number.to_le_bytes()),
+            Self::Flag(flag) => out.push(u8::from(flag.unwrap_or(false))),
+            Self::Real(Ok(number) | Err(number)) => out.extend(number.to_le_bytes()),
+            Self::Index(index) => out.extend(index.map_or(-1, i64::from).to_le_bytes()),
+        }
+    }
+
+    fn push_text(self, out: &mut Vec<u8>) {
+        match self {
+            Self::Count(number) => push_text(out, format_args!("{number}")),
+            Self::Flag(Some(flag)) => push_text(out, format_args!("{}", u8::from(flag))),
+            // Debug prints the shortest decimal that reads back to the same bits.
+            Self::Real(Ok(number)) => push_text(out, format_args!("{number:?}")),
+            Self::Index(Some(index)) => push_text(out, format_args!("{index}")),
+            Self::Flag(None) | Self::Real(Err(_)) | Self::Index(None) => {}
+        }
+    }
+}
+
+impl<T> Column<T> {
+    /// The NumPy type.
+    fn kind(&self) -> &'static str {
+        (self.value)(0, None).kind()
+    }
 }
 
 fn names<T>(columns: &[Column<T>]) -> Vec<&'static str> {
@@ -191,79 +207,56 @@ fn names<T>(columns: &[Column<T>]) -> Vec<&'static str> {
 
 /// The NumPy type of a record.
 fn record<T>(columns: &[Column<T>]) -> String {
-    let fields: Vec<String> = columns.iter().map(|c| format!("('{}', '{}')", c.name, c.kind)).collect();
+    let fields: Vec<String> = columns.iter().map(|c| format!("('{}', '{}')", c.name, c.kind())).collect();
     format!("[{}]", fields.join(", "))
 }
 
 fn arrays<T>(columns: &[Column<T>]) -> Vec<(&'static str, String)> {
-    columns.iter().map(|c| (c.name, format!("'{}'", c.kind))).collect()
+    columns.iter().map(|c| (c.name, format!("'{}'", c.kind()))).collect()
 }
 
-macro_rules! number {
+macro_rules! real {
     ($name:literal, $value:expr) => {
-        Column {
-            name: $name,
-            kind: "<f8",
-            bytes: |_, hit, out| {
-                out.extend(hit.map_or(f64::NAN, $value).to_le_bytes());
-            },
-        }
+        real!($name, $value, f64::NAN)
+    };
+    ($name:literal, $value:expr, $missing:expr) => {
+        Column { name: $name, value: |_, answer| Value::Real(answer.map($value).ok_or($missing)) }
     };
 }
 
 macro_rules! index {
     ($name:literal, $value:expr) => {
-        Column {
-            name: $name,
-            kind: "<i8",
-            bytes: |_, hit, out| {
-                out.extend(hit.and_then($value).map_or(-1, i64::from).to_le_bytes());
-            },
-        }
+        Column { name: $name, value: |_, answer| Value::Index(answer.and_then($value)) }
     };
 }
 
-/// What .npy and .npz hold: a miss has `hit` false, t = inf, NaN coordinates and -1 for names.
+/// The columns of hits.
 const COLUMNS: &[Column<CastHit>] = &[
-    Column { name: "ray", kind: "<u8", bytes: |ray, _, out| out.extend(ray.to_le_bytes()) },
-    Column { name: "hit", kind: "|b1", bytes: |_, hit, out| out.push(u8::from(hit.is_some())) },
-    Column {
-        name: "t",
-        kind: "<f8",
-        bytes: |_, hit, out| out.extend(hit.map_or(f64::INFINITY, |hit| hit.t).to_le_bytes()),
-    },
-    number!("px", |hit| hit.point.x),
-    number!("py", |hit| hit.point.y),
-    number!("pz", |hit| hit.point.z),
-    number!("nx", |hit| hit.normal.x),
-    number!("ny", |hit| hit.normal.y),
-    number!("nz", |hit| hit.normal.z),
-    number!("u", |hit| hit.uv.x),
-    number!("v", |hit| hit.uv.y),
-    Column {
-        name: "front",
-        kind: "|b1",
-        bytes: |_, hit, out| out.push(u8::from(hit.is_some_and(|hit| hit.front))),
-    },
+    Column { name: "ray", value: |ray, _| Value::Count(ray) },
+    Column { name: "hit", value: |_, hit| Value::Flag(Some(hit.is_some())) },
+    real!("t", |hit| hit.t, f64::INFINITY),
+    real!("px", |hit| hit.point.x),
+    real!("py", |hit| hit.point.y),
+    real!("pz", |hit| hit.point.z),
+    real!("nx", |hit| hit.normal.x),
+    real!("ny", |hit| hit.normal.y),
+    real!("nz", |hit| hit.normal.z),
+    real!("u", |hit| hit.uv.x),
+    real!("v", |hit| hit.uv.y),
+    Column { name: "front", value: |_, hit| Value::Flag(hit.map(|hit| hit.front)) },
     index!("shape", |hit| Some(hit.shape)),
     index!("prim", |hit| Some(hit.primitive)),
     index!("instance", |hit| hit.instance),
 ];
 
-/// The same of points: where there is nothing near, `found` is false and the distance inf.
+/// The columns of nearest points.
 const NEAREST: &[Column<CastPoint>] = &[
-    Column { name: "point", kind: "<u8", bytes: |point, _, out| out.extend(point.to_le_bytes()) },
-    Column { name: "found", kind: "|b1", bytes: |_, nearest, out| out.push(u8::from(nearest.is_some())) },
-    Column {
-        name: "distance",
-        kind: "<f8",
-        bytes: |_, nearest, out| {
-            out.extend(nearest.map_or(f64::INFINITY, |nearest| nearest.distance).to_le_bytes());
-        },
-    },
-    number!("px", |nearest| nearest.point.x),
-    number!("py", |nearest| nearest.point.y),
-    number!("pz", |nearest| nearest.point.z),
+    Column { name: "point", value: |point, _| Value::Count(point) },
+    Column { name: "found", value: |_, nearest| Value::Flag(Some(nearest.is_some())) },
+    real!("distance", |nearest| nearest.distance, f64::INFINITY),
+    real!("px", |nearest| nearest.point.x),
+    real!("py", |nearest| nearest.point.y),
+    real!("pz", |nearest| nearest.point.z),
     index!("shape", |nearest| Some(nearest.shape)),
     index!("prim", |nearest| Some(nearest.primitive)),
     index!("instance", |nearest| nearest.instance),

@@ -34,7 +34,7 @@ fn scene(folder: &Path) -> Scene {
     lumbre::open(path).unwrap()
 }
 
-/// Rays about the scene, of which some miss it.
+/// Rays around the scene; some miss it.
 fn rays() -> String {
     let mut text = String::from("ox,oy,oz,dx,dy,dz,tmax\n");
     for i in 0..203 {
@@ -45,7 +45,7 @@ fn rays() -> String {
     text
 }
 
-/// Points about the scene, of which some are inside.
+/// Points around the scene; some are inside.
 fn points() -> String {
     let mut text = String::from("x,y,z\n");
     for i in 0..203 {

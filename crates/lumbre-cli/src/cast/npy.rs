@@ -48,7 +48,7 @@ pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 const LONGEST: usize = 1 << 20;
 
 impl Header {
-    /// Reads a header by `read`, which gives the next bytes, as many as it is asked for unless they end.
+    /// Reads a header by `read`, which returns the requested number of bytes, fewer only at the end.
     ///
     /// # Errors
     /// [`HeaderError`].
@@ -123,7 +123,7 @@ impl Header {
         self.columns.saturating_mul(self.number_size())
     }
 
-    /// Checks that there are as many bytes of data as the shape asks for.
+    /// Checks that the data have the size that the shape implies.
     ///
     /// # Errors
     /// The byte of the file where data are missing, or are too many, and what was found.

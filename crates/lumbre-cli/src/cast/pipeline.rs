@@ -66,7 +66,7 @@ mod tests {
             pool.as_ref(),
             || numbers.next().map(|i| check("next", i)).transpose(),
             |i| {
-                // Those that come first end last.
+                // The first ones end last.
                 std::thread::sleep(Duration::from_micros(300 * (7 - i % 7)));
                 // What a later item does wrong is not found first.
                 if 60 < i { Err(("late".to_owned(), i)) } else { check("work", i) }

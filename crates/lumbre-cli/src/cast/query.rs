@@ -75,7 +75,7 @@ impl Query {
     }
 }
 
-/// The answers to some rays or points, the first of which has this number.
+/// The answers to consecutive rays or points, from this number on.
 ///
 /// # Errors
 /// Where there is no answer for a point.

@@ -97,7 +97,7 @@ impl RayReader {
         }
     }
 
-    /// The next rays, `most` of them where there are as many; `None` at the end.
+    /// The next rays, up to `most`; `None` at the end.
     ///
     /// # Errors
     /// [`Failure`] when they cannot be read, or there are less than was announced.

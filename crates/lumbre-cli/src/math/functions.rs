@@ -139,7 +139,7 @@ impl<'a> Call<'a> {
         }
     }
 
-    /// As many numbers as there are arguments, from argument `from` on.
+    /// One number per argument, from argument `from` on.
     pub(super) fn numbers<const N: usize>(&self, from: usize) -> Result<[f64; N], Wrong> {
         let mut numbers = [0.0; N];
         for (i, number) in numbers.iter_mut().enumerate() {

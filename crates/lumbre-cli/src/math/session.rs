@@ -115,7 +115,7 @@ impl<'a> Reader<'a> {
         Ok(reader)
     }
 
-    /// A token ahead tells `a = …` from `a`.
+    /// One token of lookahead distinguishes `a = …` from `a`.
     fn look_ahead(&mut self) -> Result<(), Wrong> {
         if self.token.kind != TokenKind::End {
             self.next = self.lexer.next()?;

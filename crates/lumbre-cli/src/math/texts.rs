@@ -1,4 +1,4 @@
-//! All sentences that are printed, as one table a language: another language is another file beside `english.rs`.
+//! All sentences that are printed, as one table per language: a new language is a new file like `english.rs`.
 
 /// The sentences of one language; `{0}` and `{1}` stand for what is filled in.
 #[derive(Debug)]

@@ -34,7 +34,7 @@ fn pair(call: &Call) -> Result<(DVec3, DVec3, usize), Wrong> {
     Ok((a, b, size))
 }
 
-/// A vector with as many components as the arguments had.
+/// A vector with the same number of components as the arguments.
 fn sized(v: DVec3, size: usize) -> Value {
     Value::Vector(v.to_array()[..size].to_vec())
 }

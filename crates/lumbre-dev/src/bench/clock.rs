@@ -1,7 +1,7 @@
 //! How long work took, as little as possible of other programs on the machine in it.
 //!
-//! Linux says how long each thread ran, not counting the time that it waited for a processor; where nobody says that, the
-//! time of the clock on the wall is taken.
+//! Linux says how long each thread ran, not counting the time that it waited for a processor; where nobody says that,
+//! the time of the clock on the wall is taken.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -52,9 +52,9 @@ impl Start {
         self.seconds(thread_ran)
     }
 
-    /// The seconds that the work of this many threads took since [`Start::of_program`]: of one thread, what all ran together, but no
-    /// more than the clock says, for threads that are done may wait busily for a while; of more, what the clock says, for one
-    /// may wait for another.
+    /// The seconds that the work of this many threads took since [`Start::of_program`]: of one thread, what all ran
+    /// together, but no more than the clock says, for threads that are done may wait busily for a while; of more, what
+    /// the clock says, for one may wait for another.
     pub(crate) fn program_seconds(&self, threads: usize) -> f64 {
         let wall = self.wall.elapsed().as_secs_f64();
         if threads == 1 { self.seconds(program_ran).min(wall) } else { wall }

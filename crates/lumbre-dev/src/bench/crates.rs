@@ -1,6 +1,6 @@
-//! Peers that are Rust crates: `obvhs` and `bvh`. They hold boxes; the primitives and their tests are the user's, here in
-//! single precision: T. Möller, B. Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", Journal of Graphics Tools
-//! 2(1), 1997, and the quadratic formula.
+//! Peers that are Rust crates: `obvhs` and `bvh`. They hold boxes; the primitives and their tests are the user's, here
+//! in single precision: T. Möller, B. Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", Journal of Graphics
+//! Tools 2(1), 1997, and the quadratic formula.
 
 use std::cell::Cell;
 use std::time::Duration;

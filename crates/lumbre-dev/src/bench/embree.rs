@@ -1,8 +1,8 @@
 //! Embree 4, loaded at run time where `EMBREE_LIB` names its shared library: the only module with `unsafe`.
 //!
-//! The declarations follow the C headers that its documentation describes (Embree 4 API reference, sections "RTCRayHit",
-//! "rtcSetSharedGeometryBuffer", "rtcSetGeometryIntersectFunction" and so on). Structures that the library writes are
-//! declared with every optional field, so that they are never too small.
+//! The declarations follow the C headers that its documentation describes (Embree 4 API reference, sections
+//! "RTCRayHit", "rtcSetSharedGeometryBuffer", "rtcSetGeometryIntersectFunction" and so on). Structures that the library
+//! writes are declared with every optional field, so that they are never too small.
 
 #![allow(unsafe_code)]
 
@@ -87,7 +87,7 @@ const _: () = assert!(size_of::<RtcRay>() == 48 && size_of::<RtcHit>() == 48);
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
 struct RtcRayHit16 {
-    // Those of the ray come first, and are an `RTCRay16` by themselves.
+    // The fields of the ray come first and form an `RTCRay16`.
     origin: [[f32; 16]; 3],
     t_near: [f32; 16],
     direction: [[f32; 16]; 3],
@@ -176,8 +176,8 @@ macro_rules! functions {
 
         impl Api {
             fn load(path: &OsStr) -> Result<Self> {
-                // SAFETY: the path is the user's, who says that it is Embree 4; its initialisers are those of an ordinary
-                // library. The symbols have the types that version 4 documents, which `Embree::load` checks.
+                // SAFETY: the path is the user's, who says that it is Embree 4; its initialisers are those of an
+                // ordinary library. The symbols have the types that version 4 documents, which `Embree::load` checks.
                 unsafe {
                     let library = Library::new(path).with_context(|| format!("cannot load {}", path.display()))?;
                     Ok(Self {
@@ -431,8 +431,8 @@ struct Group {
     device: Arc<Device>,
 }
 
-// SAFETY: a committed scene may be queried from several threads (Embree 4 API, "Thread Safety"), and it is not changed after
-// `commit`; what it shares is read only.
+// SAFETY: a committed scene may be queried from several threads (Embree 4 API, "Thread Safety"), and it is not changed
+// after `commit`; what it shares is read only.
 unsafe impl Send for Group {}
 // SAFETY: as above.
 unsafe impl Sync for Group {}
@@ -440,8 +440,8 @@ unsafe impl Sync for Group {}
 impl Group {
     fn new(device: &Arc<Device>, setting: Setting) -> Self {
         let api = &device.api;
-        // SAFETY: the device is live, and so is the scene that it makes; a null scene would show as an error in `commit`
-        // before anything is asked of it.
+        // SAFETY: the device is live, and so is the scene that it makes; a null scene would show as an error in
+        // `commit` before anything is asked of it.
         let handle = unsafe {
             let handle = (api.new_scene)(device.handle);
             (api.set_scene_quality)(handle, setting.quality());
@@ -478,8 +478,8 @@ impl Group {
         self.add(GEOMETRY_TRIANGLE, |api, geometry| {
             let (positions, indices) = (&shared.floats, &shared.mesh.indices);
             let count = shared.mesh.positions.len();
-            // SAFETY: both arrays outlive the scene, which `self.meshes` holds, and are as long as is said; behind the last
-            // vertex are sixteen more bytes.
+            // SAFETY: both arrays outlive the scene, which `self.meshes` holds, and are as long as is said; behind the
+            // last vertex are sixteen more bytes.
             unsafe {
                 let set = api.set_shared_buffer;
                 set(geometry, BUFFER_VERTEX, 0, FORMAT_FLOAT3, positions.as_ptr().cast(), 0, 12, count);
@@ -569,8 +569,8 @@ unsafe fn shapes_of<'a>(user: *mut c_void) -> &'a [PlacedShape] {
 }
 
 unsafe extern "C" fn shape_bounds(arguments: *const BoundsArguments) {
-    // SAFETY: the library passes its arguments, with the user pointer of `add_shapes`, a primitive that was counted, and room
-    // for a box.
+    // SAFETY: the library passes its arguments, with the user pointer of `add_shapes`, a primitive that was counted,
+    // and room for a box.
     unsafe {
         let arguments = &*arguments;
         let shape = &shapes_of(arguments.user)[arguments.primitive as usize];
@@ -599,8 +599,8 @@ unsafe fn active_rays(arguments: &CallbackArguments) -> impl Iterator<Item = (us
 }
 
 unsafe extern "C" fn shape_intersect(arguments: *const CallbackArguments) {
-    // SAFETY: the library passes its arguments, with the user pointer of `add_shapes` and a primitive that was counted; rays
-    // with hits are twenty arrays of `count` and one for each level of instances, whose first the context holds.
+    // SAFETY: the library passes its arguments, with the user pointer of `add_shapes` and a primitive that was counted;
+    // rays with hits are twenty arrays of `count` and one for each level of instances, whose first the context holds.
     unsafe {
         let arguments = &*arguments;
         let shape = &shapes_of(arguments.user)[arguments.primitive as usize];
@@ -782,8 +782,8 @@ impl Pass for Packets<'_> {
         };
         let _flushing = FlushToZero::begin();
         for packet in &mut self.packets {
-            // SAFETY: the scene is committed, and a packet has the layout and alignment of an `RTCRayHit16`, which begins
-            // with an `RTCRay16`.
+            // SAFETY: the scene is committed, and a packet has the layout and alignment of an `RTCRayHit16`, which
+            // begins with an `RTCRay16`.
             unsafe { trace(ALL_LANES.0.as_ptr(), scene, packet, &Arguments::COHERENT) };
         }
     }
@@ -824,8 +824,8 @@ impl FlushToZero {
 
     #[cfg(target_arch = "x86_64")]
     fn set(control: u32) {
-        // SAFETY: only the two bits above ever differ from what was there. Rust's own code between does no arithmetic on
-        // denormals whose result counts, and `drop` restores them.
+        // SAFETY: only the two bits above ever differ from what was there. Rust's own code between does no arithmetic
+        // on denormals whose result counts, and `drop` restores them.
         unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const control, options(nostack, readonly)) };
     }
 }

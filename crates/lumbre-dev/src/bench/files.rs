@@ -10,7 +10,8 @@ use lumbre_scene::GeometryDesc;
 
 use crate::scene::Scene;
 
-/// The meshes under `shared/data/meshes` beside the repository or a worktree of it; none where there is no such folder.
+/// The meshes under `shared/data/meshes` next to the repository or a worktree of it; none where there is no such
+/// folder.
 pub(crate) fn found() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let folders = ["../shared/data/meshes", "../../shared/data/meshes"].map(|folder| root.join(folder));

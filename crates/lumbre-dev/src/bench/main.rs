@@ -1,11 +1,11 @@
-//! How fast the kernel is beside Embree 4 and the crates `obvhs` and `bvh`, on the same scenes and the same rays:
+//! The kernel's speed against Embree 4 and the crates `obvhs` and `bvh`, on the same scenes and the same rays:
 //! `cargo xtask bench kernel`.
 //!
-//! Every program gets the same triangles and rays, to the bit, in single precision. Lumbre takes them as they are, by its queries in
-//! single precision, and as a peer of itself in double precision; watertight both. Programs run in alternation; a ratio is the median of the ratios of neighbouring runs, and its spread
-//! half their interquartile range. Rays are cut into chunks that threads take in turn. What is measured is how long threads
-//! ran (see `clock`). Not timed: the conversion of scenes and rays to the form of a program, and making its answers empty
-//! again.
+//! Every program gets the same triangles and rays, to the bit, in single precision. Lumbre takes them as they are, by
+//! its queries in single precision, and as a peer of itself in double precision; watertight both. Programs run in
+//! alternation; a ratio is the median of the ratios of neighbouring runs, and its spread half their interquartile
+//! range. Rays are cut into chunks that threads take in turn. What is measured is how long threads ran (see `clock`).
+//! Not timed: the conversion of scenes and rays to the form of a program, and making its answers empty again.
 
 mod clock;
 mod crates;
@@ -65,7 +65,7 @@ struct Options {
     /// Numbers of threads.
     #[arg(long, value_delimiter = ',', default_values_t = [1, 2], value_parser = clap::value_parser!(u16).range(1..))]
     threads: Vec<u16>,
-    /// A mesh (.ply, .obj, .stl) besides those that are found; may be repeated.
+    /// A further mesh (.ply, .obj, .stl); may be repeated.
     #[arg(long)]
     mesh: Vec<PathBuf>,
     /// About how many rays of each kind.
@@ -77,16 +77,17 @@ struct Options {
     /// How Lumbre builds its trees: fast, balanced or best.
     #[arg(long, default_value = "balanced", value_parser = preset)]
     preset: Preset,
-    /// Lumbre takes rays by batches, on every thread, and not one at a time; those of pixels by squares of four by four.
+    /// Lumbre takes rays by batches, on every thread, and not one at a time; those of pixels by squares of four by
+    /// four.
     #[arg(long)]
     batches: bool,
     /// Lumbre takes rays in double precision.
     #[arg(long)]
     double: bool,
-    /// Peers are Lumbre itself, asked otherwise; all take rays in double precision, but for two: by batches, with each ray written just
-    /// before, in double precision alone, with options, with masks, but for a primitive, with a closure, with vertices in double precision,
-    /// in single precision alone, which leaks, and with rays in single precision, also each written just before. The ratios are what that
-    /// costs.
+    /// Peers are Lumbre itself, asked otherwise; all take rays in double precision, but for two: by batches, with each
+    /// ray written just before, in double precision alone, with options, with masks, but for a primitive, with a
+    /// closure, with vertices in double precision, in single precision alone, which leaks, and with rays in single
+    /// precision, also each written just before. The ratios are what that costs.
     #[arg(long, conflicts_with = "batches")]
     costs: bool,
     /// Lumbre keeps every sphere as a shape of its own, not in a cloud.
@@ -477,8 +478,8 @@ struct Line<'a> {
 }
 
 impl Line<'_> {
-    /// Prints it and writes it down. `programs` says which have a figure, Lumbre first; `figure` and `ratio` are asked by the
-    /// position in it.
+    /// Prints it and writes it down. `programs` says which have a figure, Lumbre first; `figure` and `ratio` are asked
+    /// by the position in it.
     fn put(
         &self,
         programs: &[usize],

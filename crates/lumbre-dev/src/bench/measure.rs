@@ -58,8 +58,8 @@ impl<'a> Job<'a> {
     }
 }
 
-/// Runs tasks one after another, in turn forwards and backwards, at least `least` rounds, and then until the time is up, at
-/// most fifteen; past the deadline one round is enough. Answers the seconds of every task in every round.
+/// Runs tasks one after another, in turn forwards and backwards, at least `least` rounds, and then until the time is
+/// up, at most fifteen; past the deadline one round is enough. Answers the seconds of every task in every round.
 pub(crate) fn alternate<E>(
     tasks: usize,
     least: usize,

@@ -98,7 +98,7 @@ fn sphere_root(&[x, y, z, radius]: &[f32; 4], ray: &Ray) -> Option<f64> {
     let middle = -from.dot(ray.direction) / a;
     let rest = radius * radius - (from + middle * ray.direction).length_squared();
     let half = (rest / a).sqrt();
-    // A NaN, from a ray beside it, is in no range.
+    // A NaN, from a ray that misses, is in no range.
     [middle - half, middle + half].into_iter().find(|&t| ray.contains(t))
 }
 
@@ -110,8 +110,8 @@ pub(crate) struct Sample {
     pub truth: Truth,
 }
 
-/// The truth about some of the rays, evenly spread over the list, as many as `tests` tests of primitives allow, at most
-/// 1,000.
+/// The truth about some of the rays, evenly spread over the list; their number is limited by `tests` tests of
+/// primitives, at most 1,000.
 pub(crate) fn sample(scene: &Scene, rays: &[Ray], tests: usize) -> Vec<Sample> {
     let placed: usize = scene.placements.iter().map(|p| scene.placed_meshes[p.mesh].indices.len()).sum();
     let primitives = scene.primitive_count() + placed;

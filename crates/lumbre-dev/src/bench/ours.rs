@@ -42,7 +42,7 @@ pub(crate) enum Precision {
 pub(crate) enum Asked {
     /// One ray at a time.
     Each,
-    /// By batches of [`BATCH`] rays: those that are alike as packets, and the others interleaved.
+    /// By batches of [`BATCH`] rays: coherent ones as packets, the others interleaved.
     ByBatches,
     /// One ray at a time, each written number by number just before, as by who makes it.
     Fresh,
@@ -50,7 +50,7 @@ pub(crate) enum Asked {
     Plainly,
     /// One ray at a time, with options that leave nothing out.
     WithOptions,
-    /// The same, of geometries that have masks, all of which let rays through.
+    /// The same with masks on all geometries, which let all rays through.
     WithMasks,
     /// One ray at a time, but for a primitive that is nowhere.
     Excluding,
@@ -453,7 +453,7 @@ impl Pass for SingleClosest<'_> {
     }
 }
 
-/// Batches write the hits down by themselves.
+/// Batches write the hits themselves.
 struct SingleClosestBatches<'a> {
     tree: &'a Queried,
     rays: Vec<lumbre_kernel::Ray32>,

@@ -67,8 +67,8 @@ pub(crate) trait Program: Sync {
         self.takes_packets()
     }
 
-    /// Builds on this many threads. The scene's own arrays are shared where the program can read them, and copied beforehand
-    /// where it cannot. Answers the tree, the seconds that it took and the bytes that it allocated.
+    /// Builds on this many threads. The scene's own arrays are shared where the program can read them, and copied
+    /// beforehand where it cannot. Answers the tree, the seconds that it took and the bytes that it allocated.
     fn build<'a>(&'a self, scene: &'a crate::scene::Scene, threads: usize) -> anyhow::Result<Built<'a>>;
 }
 

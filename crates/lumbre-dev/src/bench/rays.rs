@@ -102,7 +102,7 @@ pub(crate) struct Rays {
     pub by_squares: Vec<usize>,
 }
 
-/// The rays of one kind of work, about as many as the picture has pixels. `accel` is asked where rays hit.
+/// The rays of one kind, about one per pixel. `accel` is asked where rays hit.
 pub(crate) fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Rays {
     match work {
         Work::Primary => Rays {
@@ -127,8 +127,8 @@ pub(crate) fn make(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) 
 }
 
 /// From the hits of one camera ray a pixel. Pixels that see nothing are made up for by more rays through the others, in
-/// the order of the pixels, at most sixteen times over; where few come so far, by more rays from the same places: a few hundred that
-/// are asked again and again are foreseen by the processor, branch by branch.
+/// the order of the pixels, at most sixteen times over; where few come so far, by more rays from the same places: a few
+/// hundred that are asked again and again are foreseen by the processor, branch by branch.
 fn secondary(work: Work, scene: &Scene, accel: &Accel, size: PictureSize) -> Rays {
     const TURNS: u64 = 16;
     let count = size.count();
@@ -209,8 +209,9 @@ fn extent_of(accel: &Accel) -> f64 {
     accel.bounds().size().max_element()
 }
 
-/// Where a ray hits, moved off the surface, and the normal on the side that it came from. The move is a hundred-thousandth
-/// of the scene: far more than single precision rounds off, so that no program finds the surface that a ray starts on.
+/// Where a ray hits, moved off the surface, and the normal on the side that it came from. The move is a
+/// hundred-thousandth of the scene: far more than single precision rounds off, so that no program finds the surface
+/// that a ray starts on.
 fn leave(accel: &Accel, ray: Ray32) -> Option<Start> {
     let ray = ray.to_f64();
     let hit = accel.closest(&ray)?;

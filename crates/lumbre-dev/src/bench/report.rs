@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::measure::{Ratio, geometric_mean};
 
-/// A figure of Lumbre's beside a peer's.
+/// A figure of Lumbre and of a peer.
 #[derive(Clone, Debug)]
 pub(crate) struct Row {
     /// The scene.
@@ -21,8 +21,8 @@ pub(crate) struct Row {
     pub threads: usize,
     /// Lumbre's figure.
     pub lumbre: f64,
-    /// The peer's name, its figure, and the ratio, more than 1 where Lumbre is faster or smaller. `None` where no peer takes
-    /// part.
+    /// The peer's name, its figure, and the ratio, more than 1 where Lumbre is faster or smaller. `None` where no peer
+    /// takes part.
     pub peer: Option<(String, f64, Ratio)>,
 }
 

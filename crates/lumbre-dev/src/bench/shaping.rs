@@ -78,8 +78,8 @@ impl Shaper {
         });
     }
 
-    /// A tube of varying radius about a curve: `curve(s)` is (middle, radius), s in [0, 1]. Its cross sections lie across
-    /// the x and y of the curve's plane, so the curve should stay near a plane of constant z.
+    /// A tube of varying radius about a curve: `curve(s)` is (middle, radius), s in [0, 1]. Its cross sections lie
+    /// across the x and y of the curve's plane, so the curve should stay near a plane of constant z.
     pub(crate) fn tube(&mut self, around: u32, along: u32, curve: impl Fn(f64) -> (DVec3, f64)) {
         self.grid(along, around, |row, column| {
             let s = f64::from(row) / f64::from(along);

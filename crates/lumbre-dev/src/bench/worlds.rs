@@ -316,8 +316,8 @@ fn forest(name: &str) -> Scene {
     }
 }
 
-/// Everything in one tree: hills of a hundred thousand triangles, five hundred trees and twenty thousand stones by instancing, most
-/// of which are seen from hundreds of times their size, and three hundred exact shapes.
+/// Everything in one tree: hills of a hundred thousand triangles, five hundred trees and twenty thousand stones by
+/// instancing, mostly seen from hundreds of times their size, and three hundred exact shapes.
 fn park(name: &str) -> Scene {
     let mut random = RandomStream::new(31);
     let mut stone = bumpy_ball(8);
@@ -414,7 +414,7 @@ fn tree(random: &mut RandomStream, height: f64) -> TriangleMesh {
     shaper.finish()
 }
 
-/// Spheres of several sizes in a cube, some of which overlap.
+/// Spheres of several sizes in a cube, partly overlapping.
 fn spheres(name: &str, count: usize) -> Scene {
     let mut random = RandomStream::new(12);
     let half = 0.6 * (count as f64).cbrt();

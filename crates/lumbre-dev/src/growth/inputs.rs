@@ -304,7 +304,7 @@ fn scene(nodes: usize) -> String {
     format!(r#"[{{"nodes":{}}}]"#, list(nodes, |i| i.to_string()))
 }
 
-/// A triangle, with other members in place of its own, or beside them.
+/// A triangle, with other members instead of its own, or in addition.
 fn gltf(members: &[(&str, String)]) -> Vec<(String, Vec<u8>)> {
     let own = [
         ("meshes", format!("[{MESH_OF_GLTF}]")),

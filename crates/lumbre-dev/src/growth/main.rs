@@ -1,7 +1,7 @@
 //! How time and memory grow with the input: `cargo xtask bench growth`.
 //!
-//! Every list that a file can hold is written with n, 2n and 4n items. Each file is read and built in a process of its own, so
-//! that its peak of memory is its own.
+//! Every list that a file can hold is written with n, 2n and 4n items. Each file is read and built in a process of its
+//! own, so that its peak of memory is its own.
 
 mod inputs;
 
@@ -45,8 +45,8 @@ fn main() -> Result<()> {
     outcome
 }
 
-/// Measures one input, and says where it grows faster than it should: time by more than the fifth of a second and six times from
-/// n to 4n, memory beyond 64 MiB and 32 times the input.
+/// Measures one input, and says where it grows faster than it should: time by more than the fifth of a second and six
+/// times from n to 4n, memory beyond 64 MiB and 32 times the input.
 fn row(name: &str, write: inputs::Write, count: usize, folder: &Path) -> Result<()> {
     let (mut seconds, mut peaks, mut size) = ([0.0; 3], [0; 3], 0);
     let mut refused = "";
@@ -112,7 +112,8 @@ mod tests {
     #[global_allocator]
     static ALLOCATED: PeakAlloc = PeakAlloc;
 
-    /// What is kept and charged, and what is taken at most while it is built and predicted, in bytes; `None` for what is refused.
+    /// What is kept and charged, and what is taken at most while it is built and predicted, in bytes; `None` for what
+    /// is refused.
     fn bytes_of(write: inputs::Write, count: usize, folder: &Path) -> Option<[[i64; 2]; 2]> {
         let files = write(count);
         for (file, bytes) in &files {

@@ -14,8 +14,8 @@ const STRIP: u32 = 16;
 /// Endings of what is shown.
 const ENDINGS: [&str; 2] = ["glb", "gltf"];
 
-/// Renders every model below `folder`, by default the sample models of glTF where they lie beside the workspace, and joins
-/// the pictures to one PNG.
+/// Renders every model below `folder`, by default the sample models of glTF if they are next to the workspace, and
+/// joins the pictures to one PNG.
 pub(crate) fn sheet(folder: Option<&Path>, output: Option<&Path>, columns: u32, spp: u32) -> Result<()> {
     let folder = folder.map_or_else(shared_models, |folder| Ok(folder.to_owned()))?;
     let output = output.map_or_else(|| root().join("docs").join("gltf-models.png"), Path::to_owned);
@@ -65,7 +65,7 @@ pub(crate) fn sheet(folder: Option<&Path>, output: Option<&Path>, columns: u32, 
     Ok(())
 }
 
-/// The folder of models that others made, `shared/data/gltf/khronos` beside the workspace or above it.
+/// The folder of models by others, `shared/data/gltf/khronos` next to the workspace or above it.
 fn shared_models() -> Result<PathBuf> {
     let beside = ["../shared", "../../shared"].map(|shared| root().join(shared).join("data/gltf/khronos"));
     let found = beside.into_iter().find(|folder| folder.is_dir());

@@ -1,4 +1,5 @@
-//! Pictures that the project makes for itself, and of itself: `cargo xtask assets`, `cargo xtask contact`, `cargo xtask agree`.
+//! Pictures that the project makes for itself, and of itself: `cargo xtask assets`, `cargo xtask contact`, `cargo xtask
+//! agree`.
 
 use std::path::PathBuf;
 
@@ -26,7 +27,7 @@ enum Task {
     Assets,
     /// Renders every glTF below a folder, small, and joins the pictures with their names to one PNG.
     Contact {
-        /// The folder; by default that of the sample models, where it lies beside the workspace.
+        /// The folder; by default that of the sample models, if it is next to the workspace.
         folder: Option<PathBuf>,
         /// The sheet; by default docs/gltf-models.png.
         #[arg(short, long)]

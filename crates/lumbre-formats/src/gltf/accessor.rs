@@ -320,7 +320,7 @@ impl<'a> Accessor<'a> {
         Err(wrong.expected(format!("{} of {}", elements.join(" or "), components.join(" or "))).into())
     }
 
-    /// The first `N` numbers of every element, which has at least as many.
+    /// The first `N` numbers of every element, which has at least N.
     pub(super) fn floats<const N: usize>(&self, file: &File<'_>) -> Read<Vec<[f32; N]>> {
         let mut elements = self.zeros(file)?;
         self.read_floats(N, elements.as_flattened_mut())?;
@@ -391,7 +391,7 @@ impl<'a> Accessor<'a> {
         Ok(())
     }
 
-    /// As many elements as it has, charged to the budget.
+    /// All its elements, charged to the budget.
     fn zeros<T: Copy + Default, const N: usize>(&self, file: &File<'_>) -> Read<Vec<[T; N]>> {
         debug_assert!(N <= self.element.numbers());
         self.needs_data(file)?;
@@ -419,7 +419,7 @@ impl<'a> Accessor<'a> {
         Ok(Some([low.numbers::<N>()?.map(|x| x / unit), high.numbers::<N>()?.map(|x| x / unit)]))
     }
 
-    /// The numbers regrouped by threes, as many as there are complete; `None` where they are not contiguous.
+    /// The numbers in groups of three, without an incomplete one; `None` where they are not contiguous.
     pub(super) fn by_threes(&self) -> Option<Self> {
         let size = self.component.bytes();
         let count = self.count / 3;

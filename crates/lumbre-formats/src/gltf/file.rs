@@ -226,7 +226,7 @@ impl<'a> File<'a> {
     /// A violation of glTF whose meaning is still clear, which other programs show: a warning, once for each
     /// place, or an error when strict.
     pub(super) fn breach(&self, wrong: Diagnostic) -> Read<()> {
-        /// At most this many are told apart; the collector keeps fewer.
+        /// At most this many are distinguished; the collector keeps fewer.
         const MOST: usize = 1 << 12;
         if self.diagnostics.borrow().strictness() == Strictness::Strict {
             return Err(wrong.into());

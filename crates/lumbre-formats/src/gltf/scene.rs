@@ -92,7 +92,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
         let copies = match value.extension("EXT_mesh_gpu_instancing")? {
             Some(extension) => {
                 let copies = instances(file, extension)?;
-                // Few bytes that many nodes share make as many copies as their product.
+                // A few bytes shared by many nodes are copied for each of them.
                 copied += (copies.len() * size_of::<InstanceDesc>()) as u64;
                 super::check_expansion(file, extension, "copies of meshes", file.buffer_bytes(), copied)?;
                 copies
@@ -280,7 +280,7 @@ pub(super) fn instances(file: &File<'_>, extension: Value<'_>) -> Read<Vec<DAffi
         }
     }
     let count = count.unwrap_or(0);
-    // Parts that the file has are charged when they are read; those that it lacks, and the result, here.
+    // Parts that the file has are charged when they are read; missing ones and the result, here.
     file.budget
         .bytes((count * (size_of::<DAffine3>() + 10 * size_of::<f32>())) as u64, "copies of meshes")?;
     let vec3 = |part: Option<Accessor<'_>>, default: Vec3| match part {
@@ -738,7 +738,7 @@ fn aspect(camera: Value<'_>) -> Read<Option<f64>> {
     Ok(Some(aspect.abs()))
 }
 
-/// About as many pixels as 1280 × 720, with this aspect ratio.
+/// About the number of pixels of 1280 × 720, with this aspect ratio.
 fn size_of_picture(aspect: f64) -> (Option<u32>, Option<u32>) {
     let aspect = aspect.clamp(0.05, 20.0);
     let height = (1280.0 * 720.0 / aspect).sqrt();

@@ -406,7 +406,7 @@ impl Reader<'_> {
         level.met += 1;
         let place = from.checked_add_signed(offset).filter(|place| {
             let end = level.first + level.count * level.size;
-            // Leaves of different sizes have no places that can be told from their number.
+            // The offsets of leaves of different sizes do not follow from their index.
             let is_inside = if is_of_leaves {
                 (level.first..=bytes.len() - level.size).contains(place) && place % 8 == 0
             } else {

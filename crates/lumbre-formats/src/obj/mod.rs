@@ -137,7 +137,7 @@ struct Reader<'a> {
     budget: &'a Budget,
     diagnostics: &'a mut Diagnostics,
     positions: BudgetVec<'a, DVec3>,
-    /// As many as positions once any has a colour.
+    /// One per position once any has a colour.
     colours: BudgetVec<'a, Rgb>,
     uvs: BudgetVec<'a, Vec2>,
     normals: BudgetVec<'a, Vec3>,
@@ -523,7 +523,7 @@ impl<'a> Reader<'a> {
             return Ok(part);
         }
         self.budget.elements(1, "meshes")?;
-        // What is kept of it to the end, and beside the shape that it becomes.
+        // Its memory to the end, in addition to that of its shape.
         let each = size_of::<Part<'_>>()
             + size_of::<(Key, usize)>()
             + size_of::<ObjMesh>()

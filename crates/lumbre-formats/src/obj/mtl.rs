@@ -105,7 +105,7 @@ pub fn read_mtl(
         if keyword.bytes == b"newmtl" {
             let (_, name) = words.rest();
             budget.elements(1, "materials")?;
-            // Its name stands in a table too, and its folder beside it.
+            // Its name is in a table too, with its folder.
             let each = size_of::<MtlMaterial>() + 2 * name.len() + 128;
             budget.bytes(each as u64, "materials")?;
             materials.push(MtlMaterial { name: name.into_owned(), ..MtlMaterial::default() });

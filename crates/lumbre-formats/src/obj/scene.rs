@@ -58,7 +58,7 @@ pub(crate) fn obj_scene(
     let of_meshes = obj.meshes.iter().filter_map(|mesh| mesh.material.as_ref());
     let of_thin = obj.thin.iter().filter_map(|thin| thin.material.as_ref());
     let used: HashSet<&str> = of_meshes.chain(of_thin).map(|(name, _)| name.as_str()).collect();
-    // Those that nothing uses have no number.
+    // Unused ones have no number.
     let mut names: HashMap<String, Option<usize>> = HashMap::new();
     let mut opened: HashSet<PathBuf> = HashSet::new();
     for (library, place) in &obj.libraries {
@@ -139,7 +139,7 @@ pub(crate) fn obj_scene(
     scene.shapes.shrink_to_fit();
     scene.without_light = match finished.iter().any(|finished| finished.lights_the_scene()) {
         true => WithoutLight::Studio,
-        // The studio stays, beside what shines faintly.
+        // The studio stays, in addition to faint emission.
         false => WithoutLight::StudioUnlessStaged,
     };
     Ok(scene)

@@ -332,7 +332,7 @@ impl<'b, 'd> Converter<'b, 'd> {
         self.budget.bytes(bytes as u64, what).at(spot)
     }
 
-    /// A name that a table keeps, charged with what a table has beside a name, and its copy in the scene.
+    /// A name that a table keeps, charged with the rest of its table entry, and its copy in the scene.
     pub fn kept_name(&self, name: &str, spot: SourcePosition) -> Result<Arc<str>> {
         const BESIDE: usize = 96;
         self.keep(2 * name.len() + BESIDE, "names", spot)?;

@@ -73,7 +73,7 @@ const REASONS: [(&str, &str); 37] = [
     ("lightsamplestrategy", "lights are chosen by a tree: it changes the noise alone"),
     ("rrthreshold", "paths end by their throughput: it changes the noise alone"),
     ("strategy", "it changes the noise alone"),
-    ("dimensions", "the points have as many as they need"),
+    ("dimensions", "the points have the dimensions that they need"),
     ("nsamples", "it changes the noise alone"),
     ("samples", "it changes the noise alone"),
     ("maxsampleluminance", "of pbrt-v3; `maxcomponentvalue` holds samples"),
@@ -174,7 +174,7 @@ fn values(page: &str, name: &str, ty: Type, choices: &[&'static str]) -> Vec<Str
     values.iter().map(|value| format!(" \"{} {name}\" [ {value} ]", ty.name())).collect()
 }
 
-/// The types of a parameter of which the reader does not say which it takes.
+/// The types of a parameter for which the reader does not say which it accepts.
 const TYPES: [Type; 11] = [
     Type::Float,
     Type::Rgb,
@@ -271,7 +271,7 @@ fn parameters(kind: &str, noun: &str, ty: &str) -> (Fate, BTreeMap<String, Fate>
             if best.as_ref().is_none_or(|best| rank(&found) < rank(best)) {
                 best = Some(found);
             }
-            // The first value that is taken says it, but for words, each of which is another matter.
+            // The first accepted value decides; strings are listed one by one.
             if best == Some(Fate::Rendered) && choices.is_empty() && !text.contains("\"bool ") {
                 break;
             }
@@ -384,7 +384,7 @@ Every directive of pbrt-v4, with its types and parameters, and what becomes of e
 - *Warned*: it is left out or replaced, with a warning that has its place. `--strict` makes an error of it.
 - *Refused*: it is an error.
 
-What is of no known name is a warning with the nearest one that is. Values out of their range, and parameters without those that they need, are errors.
+An unknown name gives a warning with the nearest known one. Values out of their range, and parameters without others that they need, are errors.
 ";
 
 const TAIL: &str = "\n\

@@ -1,4 +1,4 @@
-//! Curves, of which scenes have very many: those that follow one another with the same state are one shape.
+//! Curves. Scenes have very many, so consecutive ones with the same state form one shape.
 
 use std::sync::Arc;
 

@@ -110,7 +110,7 @@ impl Displacement {
         self.world_from_object.point(origin + position.as_dvec3())
     }
 
-    /// Asks the budget for about as many faces as there will be.
+    /// Charges the budget for about the final number of faces.
     fn check_size(&self, work: &Refinement, faces: &[[u32; 3]], budget: &Budget) -> Result<(), LimitError> {
         let area = |face: &[u32; 3]| {
             let [a, b, c] = face.map(|i| work.world[i as usize]);

@@ -22,7 +22,7 @@ use super::textures::{SpectrumUse, single};
 use crate::diagnostic::quoted;
 use crate::{Diagnostic, Input, measured};
 
-/// The material types of pbrt-v4.
+/// The material types: those of pbrt-v4, `principled` and `openpbr`.
 pub(super) const KNOWN: [&str; 14] = [
     "diffuse",
     "coateddiffuse",
@@ -346,7 +346,18 @@ impl Converter<'_, '_> {
             MaterialKind::CoatedConductor { .. } => "interface.eta",
             MaterialKind::Dielectric { .. } | MaterialKind::ThinDielectric { .. } => "eta",
             MaterialKind::CoatedDiffuse { .. } => "eta",
-            _ => return Ok(None),
+            MaterialKind::Diffuse { .. }
+            | MaterialKind::Conductor { .. }
+            | MaterialKind::ConductorReflectance { .. }
+            | MaterialKind::DiffuseTransmission { .. }
+            | MaterialKind::Principled(_)
+            | MaterialKind::Uber(_)
+            | MaterialKind::Hair(_)
+            | MaterialKind::Measured(_)
+            | MaterialKind::Subsurface(_)
+            | MaterialKind::Pov(_)
+            | MaterialKind::Mix { .. }
+            | MaterialKind::Interface => return Ok(None),
         };
         let is_spectrum = |name| params.find(name).is_some_and(|param| param.ty == Type::Spectrum);
         // pbrt-v3 has another name, which comes first.

@@ -391,7 +391,7 @@ fn size(params: &Params) -> Result<[usize; 3]> {
     Ok([params.count("nx", 1, 1)?, params.count("ny", 1, 1)?, params.count("nz", 1, 1)?].map(|n| n as usize))
 }
 
-/// The numbers of a parameter, as many as all voxels have and not negative.
+/// The numbers of a parameter: one per voxel, not negative.
 fn counted(param: &Param, size: [usize; 3], each: usize) -> Result<&[f64]> {
     let numbers = param.numbers()?;
     let voxels = size.into_iter().try_fold(each, usize::checked_mul);

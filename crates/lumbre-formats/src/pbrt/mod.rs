@@ -4,7 +4,7 @@
 //! with a warning at the place. Scenes of pbrt-v3 are upgraded while they are read, with a one-line notice.
 //!
 //! Lumbre is more lenient than pbrt: unknown parameters and types are warnings, numbers of a directive may be
-//! in brackets, integers are accepted as floats, latitude-longitude environment maps are accepted beside
+//! in brackets, integers are accepted as floats, latitude-longitude environment maps are accepted in addition to
 //! equal-area ones, and reflectances above 1 are clamped to 1. `strict` makes each warning an error.
 //!
 //! [`ShapeDesc::index`](lumbre_scene::ShapeDesc::index) counts the `Shape` directives in the order in which

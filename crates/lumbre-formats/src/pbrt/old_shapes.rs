@@ -187,7 +187,7 @@ fn functions(knots: &[f64], count: usize, order: usize, t: f64) -> Row {
         span -= 1;
     }
     let ratio = |a: f64, b: f64| if b == 0.0 { 0.0 } else { a / b };
-    // Of the order before: those that begin at span − k + 1 … span.
+    // Of the previous order, from span − k + 1 to span.
     let mut lower = vec![1.0];
     let mut values = vec![1.0];
     for k in 1..order {

@@ -52,7 +52,7 @@ fn tables(page: &str) -> Vec<Vec<Row>> {
     tables
 }
 
-/// A value of a parameter that cannot be told by its type.
+/// A value of a parameter whose type does not determine it.
 pub(super) fn special(page: &str, name: &str) -> Option<&'static str> {
     Some(match (page, name) {
         ("triangle", "p1") => "1 0 0",

@@ -17,7 +17,7 @@ use curves::{CURVES, Curves, FIRST_NM, STEP_NM};
 const KELVIN: [f64; 12] =
     [2800.0, 3200.0, 3600.0, 4000.0, 4500.0, 5000.0, 5500.0, 6000.0, 6500.0, 7500.0, 9000.0, 12_000.0];
 
-/// The matrix of a camera for light of this temperature, between those of the temperatures beside it in steps of 1/T, and as at the end
+/// The matrix of a camera for light of this temperature, interpolated in 1/T between the neighbouring temperatures, and as at the end
 /// of the table beyond; `None` for an unknown camera. Grey under D65 becomes what the camera makes of that spectrum; the rest comes as near
 /// as three channels can.
 pub(super) fn matrix(name: &str, kelvin: f64) -> Option<DMat3> {

@@ -128,7 +128,7 @@ pub(crate) fn ply_scene(
     Ok(scene)
 }
 
-/// The material of a mesh with a texture, found beside it; `None`, with a warning, when it cannot be read.
+/// The material of a mesh with a texture, which is found next to it; `None`, with a warning, when it cannot be read.
 fn textured(
     ply: &str,
     path: &Path,

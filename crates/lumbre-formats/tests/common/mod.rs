@@ -4,7 +4,7 @@
 
 use std::path::PathBuf;
 
-/// The folder `shared/data/PART` beside the repository or a worktree of it, where there is one.
+/// The folder `shared/data/PART` next to the repository or a worktree of it, where there is one.
 pub(crate) fn shared(part: &str) -> Option<PathBuf> {
     let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     let root = here.parent()?.parent()?;

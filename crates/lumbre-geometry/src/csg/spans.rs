@@ -149,7 +149,7 @@ impl Csg {
     }
 }
 
-/// The first crossing and those that coincide with it, and the later ones; `None` after the last.
+/// The first crossing and all that coincide with it, and the later ones; `None` after the last.
 #[inline]
 pub(crate) fn coincident<'a>(ray: &Ray, events: &'a [Event]) -> Option<(&'a [Event], &'a [Event])> {
     let t = events.first()?.root.t;
@@ -184,11 +184,11 @@ pub(crate) struct Membership<'a> {
     csg: &'a Csg,
     // For each leaf, how many more times it has been entered than left.
     nesting: Numbers<i32>,
-    // For each node, how many of its operands count towards it, less those that do outside of every leaf.
+    // For each node, how many of its operands count towards it, minus those that count outside every leaf.
     counts: Numbers<i32>,
 }
 
-/// A number for each of many things, at first zero: all of them, or those that have changed where a line comes to few of many.
+/// A number for each of many things, at first zero: all of them, or only the changed ones if a line meets few of many.
 enum Numbers<T> {
     All(SmallVec<[T; 32]>),
     Changed(FxHashMap<u32, T>),
@@ -264,7 +264,7 @@ impl<'a> Membership<'a> {
     /// Passes a group of coincident crossings; returns a root when the result begins or ends there.
     pub(crate) fn cross_group(&mut self, group: &[Event]) -> Option<Root> {
         let was_inside = self.contains(0);
-        // The surface belongs to a crossing that is sufficient by itself, or else to one that is necessary.
+        // The surface belongs to a crossing that is sufficient alone, or else to one that is necessary.
         let mut decisive = None;
         if group.len() > 1 {
             decisive = self.decisive(group, was_inside);
@@ -291,7 +291,7 @@ impl<'a> Membership<'a> {
         chosen.or(group.first()).map(|event| event.root)
     }
 
-    /// The crossing of the first leaf among those that by themselves change whether the point is inside the
+    /// The crossing of the first leaf among those that alone change whether the point is inside the
     /// result.
     fn decisive(&mut self, group: &[Event], was_inside: bool) -> Option<usize> {
         let mut found: Option<usize> = None;

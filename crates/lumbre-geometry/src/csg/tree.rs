@@ -40,8 +40,8 @@ struct Operand {
     is_subtracted: bool,
 }
 
-/// Many operands in two halves, by the middles of their boxes along the axis on which these are farthest apart, and a group of those
-/// that are unbounded; `None` for few.
+/// Many operands in two halves, by the middles of their boxes along the axis on which these are farthest apart, and a
+/// group of those that are unbounded; `None` for few.
 fn halves(operands: &mut [Operand]) -> Option<[&mut [Operand]; 3]> {
     if operands.len() <= MAX_TOGETHER {
         return None;
@@ -53,7 +53,7 @@ fn halves(operands: &mut [Operand]) -> Option<[&mut [Operand]; 3]> {
     let (bounded, unbounded) = operands.split_at_mut(bounded);
     let around = Aabb::around(bounded.iter().map(middle));
     if bounded.len() <= 1 || around.size() == DVec3::ZERO {
-        // They cannot be told apart.
+        // They cannot be distinguished.
         return None;
     }
     let axis = around.size().max_position();
@@ -70,12 +70,13 @@ const TOO_MANY_PARTS: ShapeError =
     ShapeError::Degenerate("the operands of csg have more than 2147483647 parts in all");
 
 impl Csg {
-    /// The maximal nesting depth: a solid by itself counts as one. Descriptions of that depth still fit on a thread's stack.
+    /// The maximal nesting depth: a single solid counts as one. Descriptions of that depth still fit on a thread's
+    /// stack.
     pub const MAX_DEPTH: usize = 1024;
 
     /// A single solid: a shape for which [`Shape::is_solid`] is true, such as a whole sphere, a torus (even-odd
-    /// if it is a spindle), a capped cylinder, or one without bounds: the half-space below a plane, an infinite cylinder or cone, a
-    /// quadric without a clipping box; or a CSG shape, whose tree is taken over.
+    /// if it is a spindle), a capped cylinder, or one without bounds: the half-space below a plane, an infinite
+    /// cylinder or cone, a quadric without a clipping box; or a CSG shape, whose tree is taken over.
     ///
     /// # Errors
     /// [`ShapeError::Degenerate`] for a shape that is not solid.
@@ -128,8 +129,8 @@ impl Csg {
     /// The union: the points in at least one of the operands.
     ///
     /// # Errors
-    /// [`ShapeError::Degenerate`] without operands, when the nesting becomes deeper than [`Csg::MAX_DEPTH`], or when there are
-    /// more than 2^31 - 1 parts in all.
+    /// [`ShapeError::Degenerate`] without operands, when the nesting becomes deeper than [`Csg::MAX_DEPTH`], or when
+    /// there are more than 2^31 - 1 parts in all.
     pub fn union(operands: Vec<Self>) -> Result<Self, ShapeError> {
         Self::combine(NodeKind::Union, operands)
     }
@@ -181,8 +182,8 @@ impl Csg {
         Ok(csg)
     }
 
-    /// Appends a node over some operands. The operands of a large union are grouped by their places, again and again, so that a ray
-    /// comes to few of them; leaves keep their order.
+    /// Appends a node over some operands. The operands of a large union are grouped by their places, again and again,
+    /// so that a ray comes to few of them; leaves keep their order.
     fn push_group(&mut self, kind: NodeKind, parent: Option<u32>, operands: &mut [Operand]) {
         let count = operands.len() as u32;
         let (needed, initial) = match kind {

@@ -36,7 +36,7 @@ impl Axial {
         }
     }
 
-    /// Tells how both crossings with the lateral surface without cuts, of both nappes, are found.
+    /// Explains both crossings with the uncut lateral surface of both nappes.
     pub(super) fn tell_side(&self, ray: &Ray, notes: &mut Notes) -> Option<(f64, f64)> {
         let (start, p, slack) = self.set_up(ray);
         let doubles = Doubles::new(self, ray.direction, p, length(slack));
@@ -172,7 +172,7 @@ impl Axial {
         }
     }
 
-    /// Tells where the line passes the planes that cut the body.
+    /// Explains where the line passes the planes that cut the body.
     pub(super) fn tell_cuts(&self, ray: &Ray, notes: &mut Notes) {
         let second = if self.p2 == self.p1 { "P₁" } else { "P₂" };
         let cuts =

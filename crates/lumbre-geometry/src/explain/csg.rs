@@ -96,7 +96,7 @@ impl Csg {
                 Fate::Coincides { operand }
             }
             (None, Some(reason)) => reason,
-            // By itself it would be a crossing of the result.
+            // Alone it would be a crossing of the result.
             (None, None) => {
                 let another = group.iter().map(|other| other.leaf as usize).find(|&leaf| is_here(leaf));
                 another.map_or(no_change, |operand| Fate::Coincides { operand })
@@ -105,7 +105,7 @@ impl Csg {
     }
 }
 
-/// Why a crossing by itself changes nothing: the first of the operands that, if it were entered or left, would let it; `None` where
+/// Why a crossing alone changes nothing: the first of the operands that, if it were entered or left, would let it; `None` where
 /// it does change whether the line is inside the result.
 fn obstacle(membership: &mut Membership, event: &Event, leaves: usize) -> Option<Fate> {
     let was_inside = membership.contains(0);
@@ -151,7 +151,7 @@ fn operand(leaf: &Leaf, is_looked_at: bool, ray: &Ray) -> Operand {
     }
 }
 
-/// The intervals within, from the ends in ascending order, each of which is entered or left.
+/// The intervals inside, from ends in ascending order, each marked as entered or left.
 fn intervals(starts_inside: bool, ends: impl Iterator<Item = (f64, bool)>) -> Vec<[f64; 2]> {
     let mut found = vec![];
     let mut depth = i32::from(starts_inside);

@@ -58,7 +58,7 @@ impl Cuboid {
     }
 }
 
-/// Tells of the interval within the box; `crossed` are the axes whose slabs the line is not parallel to.
+/// Explains the interval inside the box; `crossed` are the axes whose slabs the line is not parallel to.
 fn tell_span(notes: &mut Notes, span: Option<[(f64, u32); 2]>, crossed: &[usize]) {
     let step = notes.step(Topic::Span);
     let Some([near, far]) = span else {

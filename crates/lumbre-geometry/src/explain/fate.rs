@@ -62,7 +62,7 @@ pub enum Fate {
     },
     /// It is in the plane, but outside the edges of a triangle.
     OutsideEdges {
-        /// The barycentric coordinates, of which one is negative.
+        /// The barycentric coordinates; one is negative.
         weights: [f64; 3],
     },
     /// It is on the surface that continues a bilinear patch.

@@ -174,7 +174,7 @@ impl Step {
         self.quantity(symbol, "", Value::Intervals(value))
     }
 
-    /// Puts the textbook's formula beside the last quantity.
+    /// Adds the textbook's formula to the last quantity.
     pub(super) fn beside(&mut self, formula: impl Into<Cow<'static, str>>, value: f64) -> &mut Self {
         if let Some(last) = self.quantities.last_mut() {
             last.schoolbook = Some((formula.into(), Value::Number(value)));

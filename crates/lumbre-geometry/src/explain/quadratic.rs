@@ -49,7 +49,7 @@ pub(super) fn at_place(formula: &'static str, start: f64) -> String {
     if start == 0.0 { formula.to_owned() } else { formula.replace('W', "W₀") }
 }
 
-/// Tells where an equation is set up; `formula` and `w` are of the ray's origin, and `place` of the point at `start`.
+/// Explains where an equation is set up; `formula` and `w` are of the ray's origin, and `place` of the point at `start`.
 pub(super) fn tell_place(notes: &mut Notes, formula: &'static str, w: DVec3, start: f64, place: DVec3) {
     let step = notes.step(Topic::SetUp);
     step.vector("W", formula, w);
@@ -94,7 +94,7 @@ impl Solved {
         }
     }
 
-    /// Tells of the equation, in a step that `intermediates` begins.
+    /// Explains the equation, in a step that `intermediates` begins.
     pub(super) fn tell(&self, notes: &mut Notes, intermediates: impl FnOnce(&mut Step)) {
         let step = notes.step(Topic::Quadratic);
         intermediates(step);

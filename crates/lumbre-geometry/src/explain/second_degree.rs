@@ -10,7 +10,7 @@ use crate::support::azimuth;
 use crate::twofold::point;
 use crate::{Hyperboloid, Paraboloid, Quadric, Ray};
 
-/// Tells how both crossings of a line are found. The formulas are of a, h and c, and `from` is that of the ray's origin
+/// Explains both crossings of a line. The formulas are of a, h and c, and `from` is that of the ray's origin
 /// relative to the base.
 fn tell(
     notes: &mut Notes,

@@ -11,7 +11,7 @@ use crate::{Ray, Sphere};
 
 const FORMULAS: [&str; 3] = ["D·D", "W·D", "W·W − r²"];
 
-/// Tells how both crossings with a whole sphere are found, whose centre is called `C` and radius `r`.
+/// Explains both crossings with a whole sphere, whose centre is called `C` and radius `r`.
 pub(super) fn tell_sphere(notes: &mut Notes, center: DVec3, radius: f64, ray: &Ray) -> Option<(f64, f64)> {
     let equation = Equation::new(center, radius, ray);
     let Equation { a, h, c, keeps_digits, .. } = equation;

@@ -1,4 +1,4 @@
-//! Triangles, by the watertight test of the search and, beside it, by two others.
+//! Triangles, by the watertight test of the search and, for comparison, by two others.
 
 use lumbre_math::quadratic::dop;
 use lumbre_math::{DVec3, exact};
@@ -11,7 +11,7 @@ use crate::{Ray, Triangle, TriangleHit, WatertightRay, moller_trumbore, plane_an
 pub(super) const CORNER: [[&str; 3]; 4] =
     [["x₀", "y₀", "z₀"], ["x₁", "y₁", "z₁"], ["x₂", "y₂", "z₂"], ["x₃", "y₃", "z₃"]];
 
-/// Tells of the shear of a ray, and of the sheared `corners` of points with names.
+/// Explains the shear of a ray, and of the sheared `corners` of points with names.
 pub(super) fn tell_shear(
     notes: &mut Notes,
     sheared: &WatertightRay,

@@ -127,8 +127,8 @@ impl<F: FnMut(f64, u8) -> bool> Pieces<'_, F> {
 }
 
 impl<F> Pieces<'_, F> {
-    /// The root in a monotone piece of a thin ring by Newton's method on the torus's own equation, for the quartic has no
-    /// digits there; `None` where it does not converge.
+    /// The root in a monotone piece of a thin ring by Newton's method on the torus's own equation, for the quartic has
+    /// no digits there; `None` where it does not converge.
     fn thin_root(&self, low: f64, high: f64, guess: f64) -> Option<f64> {
         let (mut s, mut last_step) = (guess, f64::INFINITY);
         for _ in 0..12 {
@@ -148,8 +148,8 @@ impl<F> Pieces<'_, F> {
 }
 
 impl Torus {
-    /// Where the line comes nearest to the circle in the middle of the tube, from a place close by: the quartic's derivative
-    /// tells it to ten digits of the circle's size, a thin tube needs it to some of its own.
+    /// Where the line comes nearest to the circle in the middle of the tube, from a place close by: the quartic's
+    /// derivative tells it to ten digits of the circle's size, a thin tube needs it to some of its own.
     #[cold]
     fn nearest_to_circle(&self, line: &Line, mut s: f64) -> f64 {
         let reach = self.major + self.minor;
@@ -163,7 +163,7 @@ impl Torus {
             let slope = from_circle * growth + p.z * line.u.z;
             let curvature = growth * growth + line.u.z * line.u.z + from_circle * across / rho;
             let step = slope / curvature;
-            // Elsewhere it is a greatest distance, which the quartic tells well enough. False for a NaN.
+            // Elsewhere it is a greatest distance, which the quartic gives well enough. False for a NaN.
             let is_near = curvature > 0.0 && step.abs() <= 1e-3 * reach;
             if !is_near {
                 break;

@@ -78,7 +78,7 @@ impl Torus {
         self.minor < self.major
     }
 
-    /// Whether the tube is so thin that the quartic's digits do not tell whether a line meets it.
+    /// Whether the tube is so thin that the quartic's digits cannot decide whether a line meets it.
     pub(crate) fn is_thin(&self) -> bool {
         self.minor < 1e-4 * self.major
     }

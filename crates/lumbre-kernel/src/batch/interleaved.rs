@@ -73,9 +73,9 @@ pub(super) trait RaySlot<'a, 'd, L: Simd>: Sized {
 
 /// The triangles of two blocks that two lines pass: eight bits for each.
 pub(super) struct PassedLanes {
-    /// Those that the rays may hit.
+    /// Triangles that the rays may hit.
     pub(super) mask: u32,
-    /// Those that need an exact decision.
+    /// Triangles that need an exact decision.
     pub(super) uncertain: u32,
 }
 

@@ -210,7 +210,7 @@ pub(super) struct Cull {
 
 /// The bounds of a block's triangles for all rays.
 pub(super) struct CullBounds {
-    /// Those that a ray may hit.
+    /// Triangles that a ray may hit.
     pub(super) mask: u32,
     /// Bounds on the coordinates across and along the rays together, on those across, and the extent along.
     pub(super) size: [f32; 8],
@@ -361,7 +361,7 @@ impl<'a, 'd, B: Bundle<'a, 'd>> Packet<'a, 'd, B> {
         Self { decider, state, cull, has_one_origin: false, bundle: B::new(decider) }
     }
 
-    /// Traverses the tree with rays, the first of which has this position. Rays whose signs differ from the first ray's
+    /// Traverses the tree with consecutive rays, from this position on. Rays whose signs differ from the first ray's
     /// form packets of their own.
     #[inline(always)]
     pub(super) fn traverse<L: Simd>(

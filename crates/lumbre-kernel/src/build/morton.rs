@@ -94,7 +94,7 @@ impl Dealt {
 }
 
 fn deal(codes: &[Code]) -> Dealt {
-    // About as many buckets as codes, if these are few.
+    // About one bucket per code, if these are few.
     let bits = DEALT.min((codes.len() + 1).ilog2());
     let hand_of = |code: &Code| (code[0] >> (3 * BITS - bits)) as usize;
     let mut ends = vec![0; 1 << bits];

@@ -1,6 +1,6 @@
 //! Orders the children of nodes for any-hit searches, which test the last child first.
 //!
-//! Take several tests, each of which stops a ray with probability `p` at cost `c`. The expected cost is least in the
+//! Each of several tests stops a ray with probability `p` at cost `c`. The expected cost is least in the
 //! order of falling `p / c`: L. G. Mitten, "An Analytic Solution to the Least Cost Testing Sequence Problem", Journal
 //! of Industrial Engineering 11, 1960; for trees, T. Ize, C. Hansen, "RTSAH Traversal Order for Occlusion Rays",
 //! Computer Graphics Forum 30(2), 2011.
@@ -70,7 +70,7 @@ impl Sorter<'_> {
         self.isa.run(SortOne { sorter: *self, node, odds })
     }
 
-    /// Sorts the children of a node, given the odds of those that are nodes.
+    /// Sorts the children of a node, given the odds of its inner nodes.
     #[inline(always)]
     fn sort_one<L: Simd>(
         &self,
@@ -148,7 +148,7 @@ impl Dispatch for SortFew<'_> {
     }
 }
 
-/// Sorts the children of a node, given the odds of those that are nodes.
+/// Sorts the children of a node, given the odds of its inner nodes.
 struct SortOne<'a> {
     sorter: Sorter<'a>,
     node: &'a mut Node,

@@ -23,8 +23,8 @@ const OUTLINE: usize = 256;
 /// sums of |m c| and of |m h| over a row are together below 3.1. The rounding errors of the products and of the last
 /// sum or difference are less than 8u of that: 25u in total. The conversion back to double precision adds 32u, and then
 /// the rounding errors of the image of the middle, which is computed in double precision.
-/// from these units in double precision has 32u of them added, and then what rounds in the image of the middle, which is found in
-/// double precision.
+/// from these units in double precision has 32u of them added, and then what rounds in the image of the middle, which
+/// is found in double precision.
 pub(crate) struct Outline {
     whole: Aabb,
     /// The middle, and half the largest extent.

@@ -1,4 +1,4 @@
-//! Packing triangles into blocks, and moving those that are packed.
+//! Packing triangles into blocks, and moving packed ones.
 
 use lumbre_math::Vec3;
 use rayon::prelude::*;

@@ -1,8 +1,8 @@
 //! SAH bins: finds the cheapest split and performs it.
 //!
 //! I. Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", IEEE Symposium on Interactive Ray Tracing,
-//! 2007. Unlike there, the range of a side's centres is not measured: it is the rest of the parent's range, cut to the
-//! side's box. Only if the bins show that this is much too wide, it is measured.
+//! 2007. Unlike there, the range of a side's centres is not measured: it is the parent's range on that side of the
+//! split, clipped to the side's box. It is measured only if the bins show that this is much too wide.
 
 use crate::build::primitive::{Bounds, Primitive, Traits};
 use crate::intersect::{Dispatch, Simd};
@@ -117,7 +117,7 @@ impl Binning {
     }
 }
 
-/// Uses two rows at or above this many primitives.
+/// From this many primitives on, bins are filled in two alternating rows (see [`Bins`]).
 const TWO_ROWS_FROM: usize = 32;
 
 /// The contents of a node's bins.
@@ -239,7 +239,7 @@ impl Split {
     }
 }
 
-/// Whether to sum the costs of single primitives; otherwise all are equal, and blocks count.
+/// The cost of one side: with `COSTS` the sum of the primitives' costs, else its number of blocks.
 #[inline(always)]
 fn cost_of<const COSTS: bool>(count: u32, cost: u32) -> f32 {
     if COSTS { cost as f32 } else { count.div_ceil(BLOCK as u32) as f32 }
@@ -297,7 +297,7 @@ impl<const COSTS: bool> Dispatch for BestSplit<'_, COSTS> {
             sides[usize::from(other >= bin)].grow(&bins.bounds[axis][other]);
         }
         let left = bins.counts[axis][..bin].iter().sum::<u32>() as usize;
-        // The rest of the range.
+        // The range of the occupied bins.
         let mut whole = Centers { low: binning.start, high: binning.start };
         for (axis, &(low, high)) in occupied.iter().enumerate() {
             if binning.factor[axis] > 0.0 {

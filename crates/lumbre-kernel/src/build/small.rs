@@ -66,7 +66,7 @@ impl<const COSTS: bool> Dispatch for SplitSmall<'_, COSTS> {
             return if is_leaf { SmallSplit::Leaf } else { SmallSplit::Split(1) };
         }
 
-        // Without costs, prefers two leaves.
+        // In one mesh, only splits that leave at most a full leaf on each side.
         let is_one_mesh = !COSTS && is_one_group(primitives, traits);
         let (least, most) =
             if is_one_mesh { (count - BLOCK.min(count - 1), BLOCK.min(count - 1)) } else { (1, count - 1) };
@@ -142,7 +142,7 @@ fn order_on(axis: usize, primitives: &[Primitive]) -> [u8; SMALL_BUILD_MAX] {
         *center = primitive.center2_on(axis);
         start = start.min(*center);
     }
-    // As many bits of the centre as fit next to four bits for the position.
+    // The bits of the centre that fit next to four bits for the position.
     let end = centers[..primitives.len().min(SMALL_BUILD_MAX)].iter().copied().max().unwrap_or(start);
     let shift = 5_u32.saturating_sub(end.wrapping_sub(start).leading_zeros());
     let mut keys = [i32::MAX; SMALL_BUILD_MAX];

@@ -152,7 +152,7 @@ pub(crate) fn push_by_distance<W: F32x16>(node: &Node, mask: u32, enter: W, room
 fn push_many<W: F32x16>(node: &Node, mask: u32, enter: W, room: PushSlots<i64>) -> u32 {
     put_in_order(node, mask, enter, room.window);
     let count = mask.count_ones() as usize - 1;
-    // SAFETY: as many were written, and one more.
+    // SAFETY: `count` entries were written, and one more.
     unsafe {
         let nearest = room.window[count % WIDTH].assume_init() as u32;
         room.add(count);
@@ -193,7 +193,7 @@ pub(crate) fn put_and_take_by_distance<W: F32x16>(
         }
         _ => put_in_order(node, mask, enter, room.window),
     }
-    // SAFETY: as many were written.
+    // SAFETY: this many entries were written.
     unsafe { room.add(count) };
     slots.pop().map_or(Node::ABSENT, |entry| entry as u32)
 }
@@ -203,7 +203,7 @@ pub(crate) fn put_and_take_by_distance<W: F32x16>(
 #[inline(always)]
 pub(crate) fn push_as_built<W: F32x16>(node: &Node, mask: u32, room: PushSlots<u32>) -> u32 {
     W::put_chosen(mask, &node.children, room.window);
-    // SAFETY: as many were written, and one more.
+    // SAFETY: `count` entries were written, and one more.
     unsafe { room.add(mask.count_ones() as usize - 1) };
     node.children[(31 - mask.leading_zeros()) as usize % WIDTH]
 }

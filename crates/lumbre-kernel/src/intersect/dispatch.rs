@@ -1,5 +1,5 @@
-//! Work that is compiled for every instruction set and dispatched to one: tasks, for which [`Isa::run`] chooses it at every call, and
-//! queries of a ray in a tree, for which [`Isa::dispatched`] chooses it once.
+//! Work that is compiled for every instruction set and dispatched to one: tasks, for which [`Isa::run`] chooses it at
+//! every call, and queries of a ray in a tree, for which [`Isa::dispatched`] chooses it once.
 
 use std::fmt;
 
@@ -22,10 +22,10 @@ pub(crate) trait Dispatch {
     fn run<L: Simd>(self) -> Self::Output;
 }
 
-/// The type beside which dispatched work is compiled.
+/// The type with which dispatched work is compiled.
 ///
-/// The compiler puts a generic method into the codegen unit of the type whose method it is. As methods of types in different modules, the
-/// traversals are compiled in parallel; as functions of this module they would all be one unit.
+/// The compiler puts a generic method into the codegen unit of the type whose method it is. As methods of types in
+/// different modules, the traversals are compiled in parallel; as functions of this module they would all be one unit.
 trait CompilationUnit {
     // Out of the way of the others.
     #[inline(never)]
@@ -86,7 +86,7 @@ impl Isa {
         self.run_beside::<T, T>(task)
     }
 
-    /// The same, compiled beside this type: see [`CompilationUnit`].
+    /// The same, compiled with this type: see [`CompilationUnit`].
     #[inline(always)]
     pub(crate) fn run_beside<H, T: Dispatch>(self, task: T) -> T::Output {
         match self.0 {

@@ -20,7 +20,8 @@ pub(super) enum Set {
 }
 
 impl Isa {
-    /// The best that this machine has and the environment variable `LUMBRE_SIMD` allows: see [`InstructionSet::detect`].
+    /// The best that this machine has and the environment variable `LUMBRE_SIMD` allows: see
+    /// [`InstructionSet::detect`].
     pub(crate) fn best() -> Self {
         static BEST: OnceLock<Isa> = OnceLock::new();
         *BEST.get_or_init(|| {

@@ -1,5 +1,5 @@
-//! Rays one number after the other, and what is many at a time by vectors that need no features beyond those of the architecture: those
-//! for any machine, and those of NEON.
+//! Rays one number after the other, and what is many at a time by vectors that need no features beyond those of the
+//! architecture: those for any machine, and those of NEON.
 
 use std::marker::PhantomData;
 

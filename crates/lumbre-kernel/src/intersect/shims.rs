@@ -155,7 +155,7 @@ pub(crate) fn intersect_each_at(
     isa.run(Each(node, rays, alive, children))
 }
 
-/// The triangles of a block that the ray may meet in its range and those that it certainly meets, at an instruction
+/// The triangles of a block that the ray may meet in its range and the ones that it certainly meets, at an instruction
 /// set, with the interval of heights of each, for tests.
 pub(crate) fn intersect_triangles_at(
     isa: Isa,

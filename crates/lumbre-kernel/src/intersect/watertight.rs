@@ -564,7 +564,8 @@ fn side(p: Corner, q: Corner) -> Option<bool> {
     [value, p.y - q.y, q.x - p.x].into_iter().find(|&term| term != 0.0).map(|term| term > 0.0)
 }
 
-/// px qy - py qx within 1.5 ulp (W. Kahan; C.-P. Jeannerod, N. Louvet, J.-M. Muller, Mathematics of Computation 82, 2013).
+/// px qy - py qx within 1.5 ulp (W. Kahan; C.-P. Jeannerod, N. Louvet, J.-M. Muller, Mathematics of Computation 82,
+/// 2013).
 fn difference_of_products(p: Corner, q: Corner) -> f64 {
     let second = p.y * q.x;
     let error = (-p.y).multiply_add(q.x, second);

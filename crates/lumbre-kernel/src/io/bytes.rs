@@ -61,7 +61,7 @@ pub enum LoadError {
         /// The fault and its place.
         what: String,
     },
-    /// The geometries have the right kinds and sizes, but differ from those that a mapped tree was saved with:
+    /// The geometries have the right kinds and sizes, but differ from the ones that the mapped tree was saved with:
     /// vertices, shapes or transforms moved.
     Moved,
     /// The tree was built of other geometries, or these changed too much.

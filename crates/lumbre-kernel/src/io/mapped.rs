@@ -11,7 +11,7 @@
 //! primitive ids of triangles, those of spheres, entries, masks.
 //!
 //! The file is checked when it is mapped: checksums, the length, every reference and every primitive id, that unused
-//! lanes are marked as such, and that the geometries are those that it was saved with. A carefully crafted file may
+//! lanes are marked as such, and that the geometries are the ones that it was saved with. A carefully crafted file may
 //! have boxes that hide their contents, and so lose hits; it cannot make a query panic or loop forever.
 
 use std::fmt;

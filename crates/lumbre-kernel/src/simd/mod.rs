@@ -1,4 +1,4 @@
-//! Vectors of numbers, and what the compiler and the machine are told of values. It knows nothing of rays.
+//! Vectors of numbers, optimization barriers, and prefetching. It knows nothing of rays.
 
 #![allow(unsafe_code)]
 
@@ -11,20 +11,20 @@ pub(crate) mod x86;
 
 pub(crate) use vector::{F32x8, F32x16, LANE_BITS, LANES, LastEight, Row, Vector};
 
-/// Eight, and eight others, three times.
+/// Three vectors of two halves each.
 #[inline(always)]
 pub(crate) fn three_of_two<W: F32x16>(first: &[W::Half; 3], second: &[W::Half; 3]) -> [W; 3] {
     [W::of_two(first[0], second[0]), W::of_two(first[1], second[1]), W::of_two(first[2], second[2])]
 }
 
-/// The same, of which the compiler knows nothing: else it takes a ray apart ahead of a loop, into more pieces than there are
-/// registers, and writes them down once more.
+/// The same reference, opaque to the compiler. Otherwise it hoists the loads of a ray out of a loop, into more values
+/// than there are registers, and spills them.
 #[inline(always)]
 pub(crate) fn opaque<T>(value: &T) -> &T {
     #[cfg(all(target_arch = "x86_64", not(miri)))]
     {
         let mut place: *const T = value;
-        // SAFETY: nothing is done, so that it still points to `value`.
+        // SAFETY: the assembly is empty, so the pointer still points to `value`.
         unsafe {
             std::arch::asm!("/* {0} */", inout(reg) place, options(readonly, nostack, preserves_flags));
             &*place
@@ -34,14 +34,14 @@ pub(crate) fn opaque<T>(value: &T) -> &T {
     value
 }
 
-/// The same number, of which the compiler knows nothing: a branch that chooses it stays one, which is foreseen, so that nothing waits for
-/// what it was asked by; and what comes of it is made of it, and not otherwise.
+/// The same number, opaque to the compiler. It keeps a predictable branch from becoming a data dependency, and keeps
+/// expressions of the number in the order in which they are written.
 #[inline(always)]
 pub(crate) fn opaque_number(number: u32) -> u32 {
     #[cfg(all(target_arch = "x86_64", not(miri)))]
     {
         let mut same = number;
-        // SAFETY: nothing is done.
+        // SAFETY: the assembly is empty.
         unsafe {
             std::arch::asm!("/* {0:e} */", inout(reg) same, options(nomem, nostack, preserves_flags));
         }
@@ -51,7 +51,7 @@ pub(crate) fn opaque_number(number: u32) -> u32 {
     number
 }
 
-/// Asks for what stands there to be brought near, where the machine can be asked.
+/// Prefetches a value into the L1 cache, if the instruction set has an instruction for it.
 #[inline(always)]
 pub(crate) fn fetch<T>(value: &T) {
     #[cfg(all(target_arch = "x86_64", not(miri)))]

@@ -364,9 +364,9 @@ impl F32x16 for Neon16 {
     }
 
     #[inline(always)]
-    fn reduce_max_of_eight(them: [Self; 8]) -> [f32; 8] {
+    fn reduce_max_of_eight(vectors: [Self; 8]) -> [f32; 8] {
         let mut most = [0.0; 8];
-        for (most, one) in most.iter_mut().zip(them) {
+        for (most, one) in most.iter_mut().zip(vectors) {
             *most = one.reduce_max();
         }
         most

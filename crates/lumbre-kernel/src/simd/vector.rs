@@ -1,4 +1,4 @@
-//! Eight or sixteen numbers at once: those of as many boxes, rays, triangles or bounding volumes.
+//! Vectors of eight or sixteen numbers: one for each box, ray, triangle or bounding volume.
 
 use std::mem::MaybeUninit;
 use std::ops::{Add, Div, Index, Mul, Sub};
@@ -7,16 +7,16 @@ use bytemuck::Zeroable;
 
 use super::opaque_number;
 
-/// Those that are sixteen.
+/// Lanes of a wide vector.
 pub(crate) const LANES: usize = 16;
 
-/// The key of a distance in the upper half, a reference in the lower: entries order by distance.
+/// A stack entry: the key of a distance in the upper half, a reference in the lower. Entries order by distance.
 #[inline(always)]
 pub(crate) fn stack_entry(key: i32, reference: u32) -> i64 {
     (i64::from(key) << 32) | i64::from(reference)
 }
 
-/// An array that can be loaded at once.
+/// An array that is aligned for vector loads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct Row<T>(pub(crate) [T; LANES]);
@@ -28,27 +28,28 @@ impl<T: Copy> Row<T> {
     }
 }
 
-/// Numbers side by side, for arithmetic. A mask has a bit for each; comparisons with a NaN are false.
+/// A vector of f32. A mask has a bit for each lane; comparisons with NaN are false.
 pub(crate) trait Vector:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
-    /// How many there are.
+    /// Number of lanes.
     const COUNT: usize;
-    /// The mask of all.
+    /// The mask of all lanes.
     const ALL: u32 = (1 << Self::COUNT) - 1;
     type Array: Index<usize, Output = f32>;
     fn to_array(self) -> Self::Array;
-    /// All the same.
+    /// The value in all lanes.
     fn splat(value: f32) -> Self;
-    /// `self * factor + summand`, rounded once or twice.
+    /// `self * factor + summand`, fused or not, by instruction set.
     fn mul_add(self, factor: Self, summand: Self) -> Self;
-    /// `summand - self * factor`, alike.
+    /// `summand - self * factor`, fused or not.
     fn neg_mul_add(self, factor: Self, summand: Self) -> Self;
-    /// `self * factor - other`, alike.
+    /// `self * factor - other`, fused or not.
     fn mul_sub(self, factor: Self, other: Self) -> Self;
     fn sqrt(self) -> Self;
-    /// Either where one of the two is a NaN.
+    /// The smaller. If one is NaN, either may be returned.
     fn min(self, other: Self) -> Self;
+    /// The larger. If one is NaN, either may be returned.
     fn max(self, other: Self) -> Self;
     fn abs(self) -> Self;
     /// The larger of the absolute values.
@@ -56,80 +57,80 @@ pub(crate) trait Vector:
     fn max_abs(self, other: Self) -> Self {
         self.abs().max(other.abs())
     }
-    /// With the sign changed wherever the other has one.
+    /// Negated where `other` has its sign bit set.
     fn xor_sign(self, other: Self) -> Self;
     fn simd_le(self, other: Self) -> u32;
     fn simd_lt(self, other: Self) -> u32;
 }
 
-/// Eight.
+/// A vector of eight lanes.
 pub(crate) trait F32x8: Vector<Array = [f32; 8]> + Zeroable {
     fn load(eight: &[f32; 8]) -> Self;
-    /// The least of those in the mask, of which none is a NaN; infinity where there are none.
+    /// The smallest of the lanes in the mask, none of which may be NaN; infinity for an empty mask.
     fn reduce_min(self, mask: u32) -> f32;
-    /// That in a lane.
+    /// The number in a lane.
     fn lane(self, lane: usize) -> f32;
 }
 
-/// Sixteen.
+/// A vector of sixteen lanes.
 pub(crate) trait F32x16: Vector<Array = [f32; LANES]> + Zeroable {
-    /// Eight of them.
+    /// A vector of half the lanes.
     type Half: F32x8;
-    /// Eight, and eight others.
+    /// `first` in lanes 0 to 7, `second` in lanes 8 to 15.
     fn of_two(first: Self::Half, second: Self::Half) -> Self;
-    /// Eight times the one, and eight times the other.
+    /// The number `first` in lanes 0 to 7, `second` in lanes 8 to 15.
     fn splat_two(first: f32, second: f32, last: LastEight) -> Self;
-    /// The first eight, or the last: `which` is 0 or 1.
+    /// Lanes 0 to 7 if `which` is 0, lanes 8 to 15 if it is 1.
     fn half(&self, which: usize) -> Self::Half;
     fn load(row: &[f32; LANES]) -> Self;
     fn store(self, row: &mut Row<f32>);
-    /// Rounded.
+    /// The row, rounded to f32.
     fn rounded(row: &Row<f64>) -> Self;
-    /// Whether all are as the first; a NaN is not.
+    /// Whether all numbers of the row are equal; false if any is NaN.
     fn are_same(row: &Row<f64>) -> bool;
-    /// From a place, in other units; rounded, after it was computed in double precision.
+    /// `(row - place) * scale`, computed in f64, then rounded.
     fn rounded_from(row: &Row<f64>, place: f64, scale: f64) -> Self;
-    /// The difference to a number in double precision, rounded once.
+    /// `self - place`, computed in f64, then rounded.
     fn rounded_less(self, place: f64) -> Self;
-    /// Relative to a place: rounded, and the rounding error.
+    /// `row - place`, computed in f64: rounded, and the error of that rounding.
     fn parted_from(row: &Row<f64>, place: f64) -> (Self, Self);
-    /// The largest of all; any of them where one is a NaN.
+    /// The largest lane. If one is NaN, any lane may be returned.
     fn reduce_max(self) -> f32;
-    /// The same of each of eight.
-    fn reduce_max_of_eight(them: [Self; 8]) -> [f32; 8];
-    /// Whether all are the same number.
+    /// `reduce_max` of each of eight vectors.
+    fn reduce_max_of_eight(vectors: [Self; 8]) -> [f32; 8];
+    /// Whether all lanes are equal; false if any is NaN.
     fn are_equal(self) -> bool;
-    /// Everywhere the place half way between two: those inside a square of four by four that are across from one another.
+    /// In every lane the mean of lanes 5 and 10, which are opposite at the middle of a 4 by 4 square.
     fn midpoint(self) -> Self;
-    /// The first of them.
+    /// Lane 0.
     fn first(self) -> f32;
-    /// The first where the mask has a bit, else the second; bit by bit.
+    /// `first` in the lanes of the mask, `second` in the others; bits are preserved.
     fn select(mask: u32, first: Self, second: Self) -> Self;
-    /// The larger as far as that is not negative, else anything that is. Integers, which have the same order there, are compared
-    /// faster where there are instructions for it.
+    /// The larger if that is not negative; else any negative number. Some instruction sets compare faster as integers,
+    /// whose order is that of floats from 0 up.
     #[inline(always)]
     fn max_nonneg(self, other: Self) -> Self {
         self.max(other)
     }
-    /// The smaller, or anything negative where one is.
+    /// The smaller if neither is negative; else any negative number.
     #[inline(always)]
     fn min_nonneg(self, other: Self) -> Self {
         self.min(other)
     }
-    /// Where this, which is not negative, is no larger than the other.
+    /// `simd_le` for a `self` that is not negative.
     #[inline(always)]
     fn le_nonneg(self, other: Self) -> u32 {
         self.simd_le(other)
     }
-    /// Where the bits are more, as an integer.
+    /// Lanes whose bits, as `i32`, exceed `other`.
     fn bits_above(self, other: i32) -> u32;
-    /// Where these are the bits.
+    /// Lanes whose bits equal `bits`.
     fn with_bits(self, bits: u32) -> u32;
-    /// With each one's place in its last four bits.
+    /// With the index of each lane in its last four bits.
     fn lanes_in_bits(self) -> Self;
     fn bits(self) -> [i32; LANES];
 
-    /// Eight of them, each by its place, of four bits; the first in the lowest.
+    /// Eight lanes, chosen by indices of four bits each; the first index is in the lowest bits.
     #[inline(always)]
     fn swizzle(self, places: u32) -> Self::Half {
         let all = self.to_array();
@@ -140,7 +141,8 @@ pub(crate) trait F32x16: Vector<Array = [f32; LANES]> + Zeroable {
         Self::Half::load(&eight)
     }
 
-    /// Of the first four that the mask chooses, if there are as many, the bits above and the word in the same place below.
+    /// For each of the first four lanes of the mask, a stack entry of the lane's bits and its word. With fewer lanes,
+    /// the rest is arbitrary.
     #[inline(always)]
     fn first_four(self, mask: u32, words: &[u32; LANES]) -> [i64; 4] {
         let bits = self.bits();
@@ -154,8 +156,8 @@ pub(crate) trait F32x16: Vector<Array = [f32; LANES]> + Zeroable {
         four
     }
 
-    /// Puts the first four of those there, the largest first, where there are instructions for that; where there are fewer, zeros behind
-    /// them. False where there are none, and nothing is put.
+    /// Stores the entries of `first_four` in falling order, zeros last. Returns false and stores nothing if the
+    /// instruction set has no instruction for it.
     #[inline(always)]
     fn store_four_descending(
         self,
@@ -166,7 +168,7 @@ pub(crate) trait F32x16: Vector<Array = [f32; LANES]> + Zeroable {
         false
     }
 
-    /// Puts the words that the mask chooses there, in their order.
+    /// Stores the words of the lanes in the mask, in order, without gaps.
     #[inline(always)]
     fn put_chosen(mask: u32, words: &[u32; LANES], place: &mut [MaybeUninit<u32>; LANES]) {
         let mut rest = mask % (1 << LANES);
@@ -179,9 +181,8 @@ pub(crate) trait F32x16: Vector<Array = [f32; LANES]> + Zeroable {
     }
 }
 
-/// The last eight of sixteen, as a mask of which the compiler knows nothing: where it does know, it shuffles numbers
-/// instead of reading each
-/// to where it belongs.
+/// A mask of lanes 8 to 15 that is opaque to the compiler. With a known mask, it shuffles registers instead of loading
+/// into each lane.
 #[derive(Clone, Copy)]
 #[cfg_attr(not(target_arch = "x86_64"), allow(dead_code, reason = "for AVX alone"))]
 pub(crate) struct LastEight(u32);
@@ -199,9 +200,9 @@ impl LastEight {
     }
 }
 
-/// Of sixteen in rows of four, two that are across from one another beside the middle.
+/// Two lanes of a 4 by 4 square that are opposite at its middle.
 pub(super) const BEFORE_MIDDLE: usize = 5;
 pub(super) const AFTER_MIDDLE: usize = 10;
 
-/// The last bits of a number, in which its place among sixteen may stand.
+/// The last bits of a number, which may hold the index of its lane.
 pub(crate) const LANE_BITS: i32 = LANES as i32 - 1;

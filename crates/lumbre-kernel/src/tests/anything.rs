@@ -1,4 +1,5 @@
-//! Single precision among instances, clouds and meshes in double precision: the filtered traversal beside the exact one.
+//! Single precision among instances, clouds and meshes in double precision: the filtered traversal against the exact
+//! one.
 
 use std::sync::Arc;
 
@@ -105,7 +106,8 @@ fn free_ray(random: &mut Random) -> Ray {
     Ray::new(from, to - from).at_time(random.unit())
 }
 
-/// Both questions at every instruction set beside the plain search, alone and in batches; of how many rays single precision could tell.
+/// Both questions at every instruction set against the plain search, single and in batches; how many rays single
+/// precision decided.
 fn check(accel: &Accel, rays: &[Ray]) -> usize {
     let mut told = 0;
     for isa in Isa::all() {
@@ -199,7 +201,8 @@ fn ball() -> TriangleMesh {
     icosphere(2, DVec3::ZERO, 0.7)
 }
 
-/// A tree in which rays can go together everywhere, of instances that overlap, move, stand twice in one place and hold one another.
+/// A tree in which rays can go together everywhere, of instances that overlap, move, stand twice in one place and hold
+/// one another.
 fn company(random: &mut Random, is_endless: bool) -> Accel {
     let zero = DVec3::ZERO;
     let ball = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(ball()))]));

@@ -1,8 +1,8 @@
-//! The proof in `triangles`, put to the test: the test of a block in single precision never loses what the one in double
-//! precision hits, and is never certain of what that misses.
+//! The proof in `triangles`, put to the test: the test of a block in single precision never loses what the one in
+//! double precision hits, and is never certain of what that misses.
 //!
-//! Tried by hand: with a thirtieth of the error, or of the margin in z, this fails; with a third of the error it does not, for
-//! roundings seldom all go one way.
+//! Tried by hand: with a thirtieth of the error, or of the margin in z, this fails; with a third of the error it does
+//! not, for roundings seldom all go one way.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -25,8 +25,8 @@ struct Tally {
     sure: u32,
 }
 
-/// A block of triangles of about `size`, within `spread` of each other, at `center`, of whose corners about this many are
-/// those of others; the last lane stays empty.
+/// A block of triangles of about `size`, within `spread` of each other, at `center`, of whose corners about this many
+/// are those of others; the last lane stays empty.
 fn block(random: &mut Random, shares: f64, center: DVec3, spread: f64, size: f64) -> Vec<Line> {
     let mut mesh = TriangleMesh { origin: DVec3::ZERO, positions: Vec::new(), indices: Vec::new() };
     for lane in 0..BLOCK - 1 {
@@ -198,7 +198,8 @@ fn the_test_of_a_block_is_sharp() {
 
 #[test]
 fn a_ray_that_leaves_a_wall_is_seen_to_leave_it() {
-    // As rays do that bounce: moved off the surface by a hundred-thousandth of the room. Of one in six, double precision has to say so.
+    // As rays do that bounce: moved off the surface by a hundred-thousandth of the room. Of one in six, double
+    // precision has to say so.
     let mut random = Random(80);
     let (mut dispatched, mut rays) = (0, 0);
     for _ in 0..200 {
@@ -495,7 +496,8 @@ fn blocks_that_are_not_such_as_are_packed_are_told() {
     assert!(is_sound(&bytes));
     assert!(!is_sound(&bytes[..bytes.len() - 64]));
     assert!(!is_sound(&[&bytes[..], &[0; 64]].concat()));
-    // In heads: the number, the layout, how many follow, and vertices of the other half of lanes, before the row and behind it.
+    // In heads: the number, the layout, how many follow, and vertices of the other half of lanes, before the row and
+    // behind it.
     for place in places {
         let at = 64 * place as usize;
         if accel.tree.packed.blocks().block(place).is_unshared() {

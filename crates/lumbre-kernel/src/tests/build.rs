@@ -12,7 +12,7 @@ use super::scenes::{
 use crate::tree::node::tag;
 use crate::{Accel, BuildError, BuildOptions, CustomGeometry, Geometry, GeometryKind, Preset, TriangleMesh};
 
-/// Custom geometry of which nothing is ever met, and that writes down which threads ask for its boxes.
+/// Custom geometry that is never hit, and records which threads ask for its boxes.
 #[derive(Debug)]
 struct DispatchedQuery {
     count: u32,

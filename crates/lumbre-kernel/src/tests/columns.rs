@@ -1,4 +1,5 @@
-//! Rays of pictures: beside double precision, from the surfaces that they leave, and at edges and corners that must not leak.
+//! Rays of pictures: against double precision, from the surfaces that they leave, and at edges and corners that must
+//! not leak.
 
 use std::sync::Arc;
 
@@ -87,7 +88,7 @@ fn instance(accel: &Arc<Accel>, map: Transform) -> GeometryKind {
     GeometryKind::Instance(accel.instance(map))
 }
 
-/// Meshes, and shapes, clouds, custom geometry and instances of meshes and of mixtures beside them, all of one size.
+/// Meshes with shapes, clouds, custom geometry, and instances of meshes and mixtures, all of one size.
 fn anything(random: &mut Random, (size, origin): (f64, DVec3)) -> Accel {
     let mut kinds = kinds(
         &[bumpy(2, DVec3::new(-0.5, 0.1, 0.0), 0.4), soup(random, 200, DVec3::ZERO, 0.8)],
@@ -202,7 +203,7 @@ fn reach_of_rounding(accel: &Accel) -> f64 {
     4.0 * (far * rounding.relative + rounding.absolute).max_element()
 }
 
-/// Whether the answer of a ray is that of double precision for a ray beside it; all that is compared is where the hit is.
+/// Whether the answer of a ray is that of double precision for a nearby ray; all that is compared is where the hit is.
 fn is_near_double(random: &mut Random, accel: &Accel, ray: &Ray, found: Option<f64>) -> bool {
     let error = reach_of_rounding(accel);
     (0..400).any(|i| {

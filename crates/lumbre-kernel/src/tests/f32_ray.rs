@@ -1,4 +1,5 @@
-//! Rays in single precision: against a plain loop in single precision, against double precision, and at edges that must not leak.
+//! Rays in single precision: against a plain loop in single precision, against double precision, and at edges that must
+//! not leak.
 
 use std::sync::Arc;
 
@@ -108,7 +109,8 @@ fn has_one_sign(edges: [f64; 3]) -> bool {
     edges.iter().all(|&edge| edge >= 0.0) || edges.iter().all(|&edge| edge <= 0.0)
 }
 
-/// What a tree of nothing but meshes answers, by a loop over all triangles where the ray comes from nearby; and whether it does.
+/// What a tree of nothing but meshes answers, by a loop over all triangles where the ray comes from nearby; and whether
+/// it does.
 fn by_reference(accel: &Accel, ray: &Ray32) -> (Option<Hit32>, bool) {
     let start = accel.tree.single.as_ref().expect("made for this");
     assert!(start.only_triangles);
@@ -171,7 +173,8 @@ fn check(accel: &Accel, rays: &[Ray32], expected: &[Option<Hit32>], sizes: &[usi
     check_batches(accel, rays, expected, sizes)
 }
 
-/// The closest hits of a batch, and whether there are hits; also with incoherent rays interleaved where they usually are not.
+/// The closest hits of a batch, and whether there are hits; also with incoherent rays interleaved where they usually
+/// are not.
 pub(super) fn in_batch(
     accel: &Accel,
     isa: Isa,
@@ -221,7 +224,8 @@ fn alone(accel: &Accel, rays: &[Ray32]) -> Vec<Option<Hit32>> {
     rays.iter().map(|ray| accel.closest_f32(ray)).collect()
 }
 
-/// Floors at heights that are exact, each cut up in two ways, and hills that are there twice, with corners in another order.
+/// Floors at heights that are exact, each cut up in two ways, and hills that are there twice, with corners in another
+/// order.
 fn sheets() -> [TriangleMesh; 2] {
     let mut floors = TriangleMesh::default();
     for floor in 0..9u8 {
@@ -248,7 +252,7 @@ fn sheets() -> [TriangleMesh; 2] {
     [floors, hills]
 }
 
-/// Triangles that are hardly any, with corners in a line or almost, or on one another; some walls beside them.
+/// Triangles that are hardly any, with corners in a line or almost, or on one another; and some walls.
 fn slivers(random: &mut Random) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for i in 0..360 {
@@ -403,8 +407,8 @@ fn of_triangles_in_one_place_the_first_in_the_lists_is_hit() {
     }
 }
 
-/// Sixteen rays as those of a square of pixels, or about as much alike: from one eye or some places near to each other, to an eye, from
-/// surfaces, around an axis or a diagonal, where signs and the last axis change.
+/// Sixteen rays as those of a square of pixels, or about as much alike: from one eye or some places near to each other,
+/// to an eye, from surfaces, around an axis or a diagonal, where signs and the last axis change.
 fn square(random: &mut Random, mesh: &TriangleMesh, size: f64) -> [Ray32; PACKET] {
     let kind = random.below(6);
     let middle = if kind == 0 { 0.2 * size * random.vector() } else { place(random, mesh) };

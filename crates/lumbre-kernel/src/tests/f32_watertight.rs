@@ -8,8 +8,8 @@ use crate::batch::packet::PACKET;
 use crate::intersect::Isa;
 use crate::{Ray32, TriangleMesh};
 
-/// A prism over a polygon that is all but a square: on one of its sides corners lie no more than a roundoff apart, and those of its top
-/// and bottom, which are level, make fans of needles with a corner across.
+/// A prism over a polygon that is all but a square: on one of its sides corners lie no more than a roundoff apart, and
+/// those of its top and bottom, which are level, make fans of needles with a corner across.
 fn fans() -> TriangleMesh {
     let step = 1.0 / (1 << 23) as f32;
     let mut outline = vec![[-0.9, -0.7], [1.03, -0.8]];
@@ -44,8 +44,8 @@ fn closed_meshes() -> Vec<(&'static str, TriangleMesh, DVec3)> {
     ]
 }
 
-/// The mesh as it is, far off by its origin and by its vertices, stretched, small and mirrored, and large; each with where the point
-/// inside comes to lie.
+/// The mesh as it is, far off by its origin and by its vertices, stretched, small and mirrored, and large; each with
+/// where the point inside comes to lie.
 fn placements(mesh: &TriangleMesh, inside: DVec3) -> Vec<(TriangleMesh, Vec3)> {
     let moved = |factor: Vec3, by: Vec3| {
         let positions = mesh.positions.iter().map(|&p| p * factor + by).collect();
@@ -100,7 +100,7 @@ fn no_ray_from_within_leaks_at_a_corner_or_an_edge() {
                     // There are few places to start at so far off.
                     let is_shaken = number != 1 && random.below(4) == 0;
                     let origin = if is_shaken { shaken(&mut random, from) } else { from };
-                    // From where it starts to the target, from there to the target as rounded, or a little beside.
+                    // From where it starts to the target, from there to the rounded target, or a little off it.
                     let direction = match random.below(3) {
                         0 => (target - origin.as_dvec3()).as_vec3(),
                         1 if number != 1 => target.as_vec3() - origin,

@@ -76,7 +76,7 @@ fn check(accel: &Accel, point: DVec3, max_distance: f64) -> (bool, bool) {
     }
 }
 
-/// Triangles of which most have no area: lines, and points.
+/// Triangles, most without area: lines, and points.
 fn flat_soup(random: &mut Random, count: usize, center: DVec3, extent: f64) -> TriangleMesh {
     let mut mesh = soup(random, count, center, extent);
     for (i, triangle) in mesh.indices.iter_mut().enumerate() {
@@ -151,7 +151,7 @@ fn what_has_no_area_is_as_near_as_it_is_and_no_ray_hits_it() {
 
 #[test]
 fn a_needle_and_a_point_have_the_distances_that_they_have() {
-    // A triangle on a line of the x axis, one in a point, and one on a line far away, beside two that have an area.
+    // A triangle on a line of the x axis, one in a point, and one on a line far away, and two with an area.
     let vertices =
         [[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [5, 5, 5], [10, 10, 10], [10, 10, 12], [10, 10, 11]];
     let positions = vertices.map(|p: [i32; 3]| lumbre_math::Vec3::from_array(p.map(|c| c as f32))).to_vec();

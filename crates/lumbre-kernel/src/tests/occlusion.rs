@@ -31,8 +31,8 @@ fn corners(node: &Node, lane: usize) -> [DVec3; 2] {
     [0, 1].map(|side| DVec3::from_array([0, 2, 4].map(|axis| f64::from(node.planes[axis + side][lane]))))
 }
 
-/// Checks the order of all children below a node, and counts those that were checked; what is to be expected of it, where there are
-/// nothing but triangles below.
+/// Checks the order of all children below a node, and counts those that were checked; what is to be expected of it,
+/// where there are nothing but triangles below.
 fn check_order(accel: &Accel, reference: u32, checked: &mut usize) -> Option<Odds> {
     let tree = &accel.tree.packed;
     let node = &tree.nodes[reference as usize];
@@ -127,7 +127,7 @@ fn children_are_ordered_by_occlusion_per_cost() {
 fn a_wall_is_asked_before_a_larger_bush() {
     let random = &mut Random(912);
     let mut corners = Vec::new();
-    // Leaves of a bush, each of which is small in the box of some.
+    // Leaves of a bush, each small in the box of several.
     for _ in 0..400 {
         let place = CENTER + 4.0 * random.vector();
         corners.extend([0, 1, 2].map(|_| place + 0.02 * random.vector()));

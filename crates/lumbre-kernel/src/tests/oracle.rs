@@ -176,7 +176,7 @@ fn placed_meshes_are_found_as_by_a_loop() {
     });
 }
 
-/// Triangles that pass through each other, in instances and beside them.
+/// Triangles that pass through each other, in instances and outside.
 fn soup_in_and_beside_instances(random: &mut Random) -> Accel {
     let soup = GeometryKind::Mesh(Arc::new(soup(random, 150, CENTER, 3.0)));
     let inner = Arc::new(build(vec![GeometryKind::Mesh(Arc::new(icosphere(2, CENTER, 2.5))), soup.clone()]));

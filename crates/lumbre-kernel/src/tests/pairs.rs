@@ -1,4 +1,4 @@
-//! Sixteen triangles with a ray each, beside each alone, and the numbers of sixteen rays.
+//! Sixteen triangles with a ray each, against each alone, and the numbers of sixteen rays.
 
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;

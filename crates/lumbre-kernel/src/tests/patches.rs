@@ -1,4 +1,5 @@
-//! Bilinear patches that share their edges with others and with triangles: no ray passes between, and each crossing has one owner.
+//! Bilinear patches that share their edges with others and with triangles: no ray passes between, and each crossing has
+//! one owner.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -10,7 +11,8 @@ use super::oracle::check;
 use super::scenes::{Random, build};
 use crate::{Accel, GeometryKind, TriangleMesh};
 
-/// A closed body of quads: the surface of a cube of `n` × `n` × `n` cells about zero, its vertices moved by up to `bend` cells.
+/// A closed body of quads: the surface of a cube of `n` × `n` × `n` cells about zero, its vertices moved by up to
+/// `bend` cells.
 struct Body {
     positions: Vec<Vec3>,
     /// Counter-clockwise from outside.
@@ -43,8 +45,8 @@ fn body(n: i32, bend: f64, random: &mut Random) -> Body {
     Body { positions, quads }
 }
 
-/// The body as patches, each run along in one of the eight ways, under `map`; a share of the quads as two triangles each, if `map` is
-/// a translation to `origin`.
+/// The body as patches, each run along in one of the eight ways, under `map`; a share of the quads as two triangles
+/// each, if `map` is a translation to `origin`.
 fn geometries(
     body: &Body,
     map: Transform,

@@ -34,7 +34,8 @@ fn tree(kind: GeometryKind, preset: Preset) -> Accel {
     Accel::build(vec![Geometry { id: 3, kind }], &BuildOptions { preset }).unwrap()
 }
 
-/// The mesh as it is, far from the origin, in an instance, and in an instance of an instance: with the map to each place.
+/// The mesh as it is, far from the origin, in an instance, and in an instance of an instance: with the map to each
+/// place.
 fn placements(mesh: &TriangleMesh, preset: Preset) -> [(Accel, Transform); 4] {
     let mut random = Random(19);
     let far = DVec3::new(1.0e6, -3.0e5, 7.0e6);
@@ -62,10 +63,10 @@ const CHUNK: u64 = 1 << 14;
 /// Rays of a batch, where they are to fly.
 const FLOCK: usize = 256;
 
-/// Half as many rays at vertices as `rays`, half at edges, from within: every one has a closest hit, every fourth is
-/// asked for all its crossings as well, which must be odd in number, and every other fourth whether it hits at all. Half of them
-/// are aimed at triangles that follow one another, and are asked by batches of sixteen, too; the others by larger ones, in which they
-/// fly. Answers how many rays there were.
+/// Half of `rays` at vertices, half at edges, from inside: every one has a closest hit, every fourth is
+/// asked for all its crossings as well, which must be odd in number, and every other fourth whether it hits at all.
+/// Half of them are aimed at triangles that follow one another, and are asked by batches of sixteen, too; the others by
+/// larger ones, in which they fly. Answers how many rays there were.
 fn bombard(rays: u64, seed: u64) -> u64 {
     let meshes = closed_meshes();
     let places = (meshes.len() * Preset::ALL.len() * 4) as u64;
@@ -157,9 +158,9 @@ fn by_batch(accel: &Accel, rays: &[Ray]) -> (Vec<Option<Hit>>, Vec<bool>) {
     (hits, any)
 }
 
-/// Trees against the loop: the same hit, with the same bits of t, and any hit where there is one. A third of the rays follow one
-/// another closely, and are asked by batches of sixteen; a third are asked by larger ones, in which they fly. Answers how many of the
-/// rays hit something.
+/// Trees against the loop: the same hit, with the same bits of t, and any hit where there is one. A third of the rays
+/// follow one another closely, and are asked by batches of sixteen; a third are asked by larger ones, in which they
+/// fly. Answers how many of the rays hit something.
 fn compare(rays: u64, seed: u64) -> u64 {
     let chunks = rays.div_ceil(CHUNK);
     let center = DVec3::new(1.5, -2.25, 4.0);
@@ -231,7 +232,7 @@ fn proof_that_trees_answer_as_a_loop() {
 
 #[test]
 fn with_every_preset_the_places_are_what_they_seem() {
-    // A ray that is aimed beside the mesh passes it by, so that "no leak" above means something.
+    // A ray that is aimed past the mesh misses it, so that "no leak" above means something.
     with_every_preset(|| {
         for (_, mesh, inside) in closed_meshes() {
             for (accel, map) in placements(&mesh, super::scenes::options().preset) {

@@ -41,7 +41,7 @@ fn place(number: usize) -> DVec3 {
     CENTER + DVec3::from_array([number % 4, number / 4 % 4, number / 16].map(|x| x as f64))
 }
 
-/// Balls of which each has such a place.
+/// Balls, each with such a place.
 fn crowd(places: &[usize]) -> Vec<Geometry> {
     let ball = icosphere(1, DVec3::ZERO, RADIUS);
     let at = |(id, &number): (usize, &usize)| {
@@ -69,7 +69,8 @@ fn shapes(random: &mut Random) -> Vec<Geometry> {
     (0..400).map(|id| Geometry { id, kind: kind() }).collect()
 }
 
-/// The cost of a ray after such a refit, after a partial rebuild, and after a build, each as a multiple of that of the tree before.
+/// The cost of a ray after such a refit, after a partial rebuild, and after a build, each as a multiple of that of the
+/// tree before.
 fn growths(before: Vec<Geometry>, after: Vec<Geometry>) -> [f64; 3] {
     let mut accel = Accel::build(before, &options()).unwrap();
     let built = crate::build::refit::cost(&accel.tree.packed.nodes);

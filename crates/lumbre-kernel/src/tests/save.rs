@@ -169,7 +169,7 @@ fn masks_are_saved_and_stay_through_a_refit() {
     assert_eq!(both(&loaded), expected);
     loaded.refit(accel.tree.geometries.clone()).unwrap();
     assert_eq!(both(&loaded), expected);
-    // As many as geometries, or none.
+    // One per geometry, or none.
     let mut fewer = bytes.clone();
     let place = fewer.len() - 16;
     fewer.drain(place..place + 4);

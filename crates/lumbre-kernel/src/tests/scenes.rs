@@ -156,7 +156,8 @@ pub(crate) fn icosphere(levels: u32, center: DVec3, radius: f64) -> TriangleMesh
     mesh(positions.into_iter().map(|p| center + radius * p).collect(), indices)
 }
 
-/// A closed mesh that is no convex body, but seen whole from its centre: an icosphere with its vertices moved in and out.
+/// A closed mesh that is no convex body, but seen whole from its centre: an icosphere with its vertices moved in and
+/// out.
 pub(crate) fn bumpy(levels: u32, center: DVec3, radius: f64) -> TriangleMesh {
     let mut random = Random(29);
     let mut ball = icosphere(levels, DVec3::ZERO, radius);
@@ -202,7 +203,8 @@ pub(crate) fn soup(random: &mut Random, count: usize, origin: DVec3, extent: f64
     TriangleMesh { origin, positions, indices }
 }
 
-/// Walls and boards of two triangles each every which way, and among them a hundred times as many small triangles, in heaps.
+/// Walls and boards of two triangles each every which way, and among them, in heaps, a hundred small triangles for each
+/// of these.
 pub(crate) fn room(random: &mut Random, walls: usize) -> TriangleMesh {
     let mut positions = Vec::new();
     let mut indices = Vec::new();
@@ -388,7 +390,8 @@ pub(crate) fn mixture(random: &mut Random, center: DVec3, extent: f64, depth: u3
     build(kinds)
 }
 
-/// Rays of every sort around `center`: from outside, from within, along axes, with signed zeros, cut ranges, any length.
+/// Rays of every sort around `center`: from outside, from within, along axes, with signed zeros, cut ranges, any
+/// length.
 pub(crate) fn ray(random: &mut Random, center: DVec3, extent: f64) -> Ray {
     let target = center + extent * random.vector();
     let origin = match random.below(4) {

@@ -1,4 +1,4 @@
-//! Queries at an instruction set, and what each traversal comes to by itself.
+//! Queries at an instruction set, and the answer of each traversal alone.
 
 use lumbre_geometry::Ray;
 
@@ -91,7 +91,8 @@ impl Accel {
         }
     }
 
-    /// Whether the tree is of nothing but triangles to the filtered traversal; `None` where only the exact one traverses it.
+    /// Whether the tree is of nothing but triangles to the filtered traversal; `None` where only the exact one
+    /// traverses it.
     pub(crate) fn only_triangles(&self) -> Option<bool> {
         self.tree.single.as_ref().map(|start| start.only_triangles)
     }

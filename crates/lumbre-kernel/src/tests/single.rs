@@ -1,4 +1,4 @@
-//! Single precision decides as double precision does: the filtered traversal beside the exact one.
+//! Single precision decides as double precision does: the filtered traversal against the exact one.
 
 use std::sync::Arc;
 
@@ -95,7 +95,7 @@ fn alike(random: &mut Random, mesh: &TriangleMesh, size: f64) -> [Ray; PACKET] {
     })
 }
 
-/// Every search of a tree beside the plain one, which answers with the same bits.
+/// Every search of a tree against the plain one, which answers with the same bits.
 fn check(accel: &Accel, rays: &[Ray], least: u32) {
     for isa in Isa::all() {
         // For closest and any hits: rays that the exact traversal has to answer.
@@ -190,13 +190,13 @@ fn rays_that_go_together_are_answered_as_each_alone() {
             let count = packets.iter().filter(together).count();
             assert!(count > 60 || !accel.isa.has_vectors(), "{count}");
             check(&accel, packets.as_flattened(), 1_500);
-            // In a long batch, those that do not gain by it are seldom tried.
+            // In a long batch, batches that gain nothing are rarely tried.
             packets.iter().for_each(|packet| check_packet(&accel, packet));
         }
     }
 }
 
-/// Each level's batch of these rays beside each ray alone.
+/// Each level's batch of these rays against single rays.
 pub(super) fn check_packet(accel: &Accel, rays: &[Ray; PACKET]) {
     let mut others = *rays;
     others.reverse();
@@ -255,7 +255,8 @@ fn rays_of_several_octants_go_together_by_octants() {
     let accel = scenes::build(vec![GeometryKind::Mesh(mesh.into())]);
     let mut seen = [0; 3];
     for i in 0..200 {
-        // Half are left and half are right of an axis, or above and below; or around a diagonal, where another axis is the last.
+        // Half are left and half are right of an axis, or above and below; or around a diagonal, where another axis is
+        // the last.
         let (forward, side) =
             [(DVec3::Y, DVec3::X), (DVec3::Z, DVec3::Y), (DVec3::X + DVec3::Y, DVec3::X)][i % 3];
         let eye = -3.0 * forward + 0.3 * random.vector();
@@ -364,8 +365,8 @@ fn bits(hit: &Option<Hit>) -> Option<[u64; 3]> {
     hit.as_ref().map(|hit| [hit.root.t, hit.root.local.x, hit.root.local.y].map(f64::to_bits))
 }
 
-/// Both searches with options beside the plain ones, which answer with the same bits; the nearest hit, and whether the first
-/// search was settled.
+/// Both searches with options against the plain ones, which answer with the same bits; the nearest hit, and whether the
+/// first search was settled.
 fn check_with(isa: Isa, accel: &Accel, ray: &Ray, options: &Query) -> (Option<Hit>, bool) {
     let plain = accel.closest_with_exact_at(isa, ray, options);
     let found = accel.closest_with_at(isa, ray, options);

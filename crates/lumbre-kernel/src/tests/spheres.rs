@@ -316,7 +316,7 @@ fn compare(block: &SphereBlock, ray: &Ray, origin: DVec3, tally: &mut Tally) {
     }
 }
 
-/// Rays from anywhere, often those that all but touch, or whose range ends at a crossing.
+/// Rays from anywhere, often nearly tangent, or whose range ends at a crossing.
 fn bombard(seed: u64, center: DVec3, spread: f64, size: f64, distance: f64, shift: DVec3) -> Tally {
     let mut random = Random(seed);
     let mut tally = Tally { hits: 0, kept: 0, sure: 0 };

@@ -51,7 +51,8 @@ fn aim(accel: &Accel, origin: DVec3, target: DVec3) -> bool {
     count > 0
 }
 
-/// Sends `rays` at vertices and as many at edges. From a point within, every ray must hit: an odd number of times.
+/// Sends `rays` at vertices and the same number at edges. From a point within, every ray must hit: an odd number of
+/// times.
 fn bombard(name: &str, mesh: &TriangleMesh, inside: DVec3, rays: usize, random: &mut Random) {
     let placed = placements(mesh, random);
     let center = mesh.positions.iter().map(|p| p.as_dvec3()).sum::<DVec3>() / mesh.positions.len() as f64;
@@ -106,11 +107,11 @@ fn bombard_all(rays: usize) {
 
 #[test]
 fn no_aimed_ray_leaks_and_every_crossing_has_one_owner() {
-    // 2 points × 5 meshes: a hundred thousand at edges, as many at vertices, each from without and from within.
+    // 2 points × 5 meshes: a hundred thousand at edges and at vertices each, from outside and from inside.
     bombard_all(20_000);
 }
 
-/// Ten million at edges and as many at vertices.
+/// Ten million each at edges and vertices.
 #[test]
 #[ignore = "a quarter of an hour; run before a release"]
 fn no_aimed_ray_leaks_in_twenty_million() {

@@ -1,4 +1,4 @@
-//! What eight and sixteen numbers give together, beside each alone.
+//! Vectors of eight and sixteen numbers, against each number alone.
 
 use super::scenes::Random;
 use crate::intersect::{Dispatch, Isa, Simd};
@@ -146,7 +146,7 @@ impl Dispatch for Arithmetic {
 fn arithmetic_gives_in_every_lane_what_it_gives_alone() {
     let mut random = Random(173);
     for _ in 0..100 {
-        // Whole numbers, of which nothing is rounded.
+        // Integers: nothing is rounded.
         let mut row = || std::array::from_fn(|_| random.below(9) as f32 - 4.0);
         let [a, b, c]: [[f32; LANES]; 3] = [row(), row(), row()];
         let alone = |i: usize| {

@@ -72,7 +72,7 @@ pub(crate) fn heights(t: f64, length: f64) -> (f32, f32) {
 }
 
 /// Whether the ray, in the space of a tree, meets the front of its hit in the instance that `route` leads to. `None` if
-/// only the exact traversal can tell.
+/// only the exact traversal can decide.
 #[cold]
 #[inline(never)]
 pub(crate) fn enters(

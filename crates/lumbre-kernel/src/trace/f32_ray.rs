@@ -300,7 +300,7 @@ impl F32Ray {
         self.shear[3] = t_max;
     }
 
-    /// How the line of the ray passes the triangles of a block, and a mask of those that it may pass through.
+    /// How the line of the ray passes the triangles of a block, and a mask of the ones that it may pass through.
     #[inline(always)]
     pub(crate) fn lines<L: Simd>(&self, block: &TriangleBlock) -> (u32, Lines<L::F32x8>) {
         let (mask, lines) = Lines::of(L::sheared_corners(block, simd::opaque(self)));
@@ -359,7 +359,7 @@ impl F32Ray {
         }
         let t = ((u * a[2] + v * b[2] + w * c[2]) / det * f64::from(self.minus_inverse)) as f32;
         (self.t_min() <= t && t <= self.t_max()).then(|| {
-            // The sign of the sum tells the face.
+            // The sign of the sum decides the face.
             let size = det.abs();
             (t, [(v / size) as f32, (w / size) as f32, if det > 0.0 { 1.0 } else { -1.0 }])
         })

@@ -2,7 +2,7 @@
 //!
 //! [`filtered`] is the traversal that every query takes first: single precision decides what it is certain of, and
 //! double precision the rest (see [`decide`]), so that an answer has the same bits as with double precision alone. If
-//! neither can tell, because the ray meets an edge exactly or starts far away, [`exact`] answers: the traversal in
+//! neither can decide, because the ray meets an edge exactly or starts far away, [`exact`] answers: the traversal in
 //! double precision, which finds all hits, and is the oracle of the other traversals. Rays in single precision have a
 //! traversal of their own, [`f32_ray`], in trees of triangles; [`picture`] extends it to trees of any primitives.
 

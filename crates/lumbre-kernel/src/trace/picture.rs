@@ -198,7 +198,7 @@ impl LocalRay {
 enum Approach {
     Ray(LocalRay),
     PassesBy,
-    /// Only double precision can tell.
+    /// Only double precision can decide.
     Unknown,
 }
 

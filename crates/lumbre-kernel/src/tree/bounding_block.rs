@@ -138,7 +138,7 @@ pub(crate) struct BoundingVolumes {
 const GOES_ON: u32 = 1 << 31;
 
 impl BoundingVolumes {
-    /// The bounding volumes of a tree's entries, some of which are shapes; none if single precision is too coarse for
+    /// The bounding volumes of a tree's shapes; none if single precision is too coarse for
     /// the tree.
     pub(crate) fn new<'g>(
         entries: &[Entry],
@@ -217,17 +217,18 @@ fn leaves(entries: &[Entry]) -> impl Iterator<Item = (&[Entry], usize)> {
 /// the double-precision hit may be off by `slop` from the line or the shape: `moved` is the sum of both. Let the margin
 /// be m = 64u N (W + S) + N `moved` + 16u.
 ///
-/// *Slabs.* The planes of the cube, moved outwards by m, are met at near = -(a + w) / |d| and far = (w - a) / |d|, with the sign of
-/// d taken off p for a, and w = 1 + m (or m along y where the bounding volume is flat). Their roundings are worth less
-/// than 3u|h d| + 2u (|a| + w)
+/// *Slabs.* The planes of the cube, moved outwards by m, are met at near = -(a + w) / |d| and far = (w - a) / |d|, with
+/// the sign of d taken off p for a, and w = 1 + m (or m along y where the bounding volume is flat). Their roundings are
+/// worth less than 3u|h d| + 2u (|a| + w)
 /// ≤ 7u N (W + S) + 4u on the axis, for which m has room: near ≤ h ≤ far at every hit.
 ///
-/// *Profile.* What is left of the line, between heights among which h is, is again p' + k d' with |k| ≤ 1: p' in its middle, and
-/// p' ± d' at its ends, no coordinate beyond 1 + 2m. There x² + y² + c z² + d z + e is a parabola A k² + 2B k + C. At the hit it
-/// truly is not positive, and it changes by less than 8 (1 + m) m + 3m² with what the point is wrong by, these last roundings
-/// included, which is m at most. Those of A, B, C and of their sum are below 2⁻¹⁷ (1 + m)². So the computed parabola is no greater
-/// than `tolerance` = 12 m (1 + m) + 2⁻¹⁵ there, by 2⁻¹⁶ at least, and so is its least value, which is at an end, or C - B² / A
-/// where |B| < A; that this is greater is seen from (C - tolerance) A > B², with roundings below 4u B² < 4u A².
+/// *Profile.* What is left of the line, between heights among which h is, is again p' + k d' with |k| ≤ 1: p' in its
+/// middle, and p' ± d' at its ends, no coordinate beyond 1 + 2m. There x² + y² + c z² + d z + e is a parabola A k² + 2B
+/// k + C. At the hit it truly is not positive, and it changes by less than 8 (1 + m) m + 3m² with what the point is
+/// wrong by, these last roundings included, which is m at most. Those of A, B, C and of their sum are below 2⁻¹⁷ (1 +
+/// m)². So the computed parabola is no greater than `tolerance` = 12 m (1 + m) + 2⁻¹⁵ there, by 2⁻¹⁶ at least, and so
+/// is its least value, which is at an end, or C - B² / A where |B| < A; that this is greater is seen from (C -
+/// tolerance) A > B², with roundings below 4u B² < 4u A².
 ///
 /// *Tube.* In the space of x, y and r z, the distance of a point from a ring's tube is √((ρ - (1 - r))² + r² z²) - r,
 /// and a move of the point changes it by at most the length of the move. So a piece of the line has no hit if its

@@ -16,14 +16,15 @@
 //! involved. `slop` allows 2⁻⁴⁷ of them times the condition of the transforms, and at least 2⁻⁴⁰.
 //!
 //! On one axis let `R = 1/d > 0` and `p` be the lower plane; the hit has `s ≥ (p - o - slop) R` exactly. We compute
-//! `near = p r + c` with `r = f32(R)`, `|r - R| ≤ u|R|`, u = 2⁻²⁴, and `c = f32(-o R - e)`, wrong by `u|R||o|` and what is
-//! small beside it. With a fused multiply-add, `near ≤ p R - o R - e + u|R|(2|p| + 2|o|)(1 + 4u)`; with a separate
-//! product, one `u|R||p|` more. So `e = |R| (4u (1.01 + |o|) + slop)` makes `near` no greater than the hit's `s`. The same
-//! holds mirrored for the far planes, and for R < 0 with the planes exchanged.
+//! `near = p r + c` with `r = f32(R)`, `|r - R| ≤ u|R|`, u = 2⁻²⁴, and `c = f32(-o R - e)`, wrong by `u|R||o|` and what
+//! is small compared with it. With a fused multiply-add, `near ≤ p R - o R - e + u|R|(2|p| + 2|o|)(1 + 4u)`; with a
+//! separate product, one `u|R||p|` more. So `e = |R| (4u (1.01 + |o|) + slop)` makes `near` no greater than the hit's
+//! `s`. The same holds mirrored for the far planes, and for R < 0 with the planes exchanged.
 //!
-//! A ray may also be rounded before: `o`, `d` and `R` in single precision are off by `u|o|`, `u|d|` and a little more than `2u|R|`.
-//! Then `p r` is off by `2.01u|R||p|`, `o r` by `3.1u|R||o|`, and three roundings (one of a separate product among them, for each of
-//! the two) add `2u|R||p| + 3u|R||o|` and what is small beside it: `e = |R| (8u (1.01 + |o|) + slop)` has room for all of it.
+//! A ray may also be rounded before: `o`, `d` and `R` in single precision are off by `u|o|`, `u|d|` and a little more
+//! than `2u|R|`. Then `p r` is off by `2.01u|R||p|`, `o r` by `3.1u|R||o|`, and three roundings (one of a separate
+//! product among them, for each of the two) add `2u|R||p| + 3u|R||o|` and what is small compared with it: `e = |R| (8u
+//! (1.01 + |o|) + slop)` has room for all of it.
 //!
 //! A component below 2⁻⁶⁰ of the lower bound on the largest component, including zeros of both signs, is replaced by
 //! that bound: a hit lies within |s d| ≤ 20 + 12 slop on the largest axis, where that moves the line by less than 2⁻⁵⁴

@@ -131,21 +131,23 @@ impl ExactSphere {
 /// its square. For the same reasons, half the chord, √(r² - p²), is at most the computed √(s² - p²), up to a relative
 /// error of u.
 ///
-/// In double precision, t |d| is off from b ± √(r² - p²) as it is there by no more than 2uR: where the line all but touches,
-/// r² - p² is 0 or at least 2⁻⁵⁴r², so that the divisor of the stable quadratic is at least 2⁻²⁷r |d|, and what it divides is
-/// off by 2⁻⁵¹r² at most; elsewhere it is off by far less. So both crossings lie at b ∓ √(s² - p²) as computed here or
-/// between, give or take (10.5 + 1 + 2 + 3)uR; `range_margin` = 64uR also has room for the roundings of the range's ends.
+/// In double precision, t |d| is off from b ± √(r² - p²) as it is there by no more than 2uR: where the line all but
+/// touches, r² - p² is 0 or at least 2⁻⁵⁴r², so that the divisor of the stable quadratic is at least 2⁻²⁷r |d|, and
+/// what it divides is off by 2⁻⁵¹r² at most; elsewhere it is off by far less. So both crossings lie at b ∓ √(s² - p²)
+/// as computed here or between, give or take (10.5 + 1 + 2 + 3)uR; `range_margin` = 64uR also has room for the
+/// roundings of the range's ends.
 ///
-/// Where |p| ≤ r - `margin` as computed here, the line does cross the sphere, for 32uR is more than δ and all roundings. The
-/// first crossing is then in range where b - √(s² - p²) is by `range_margin` after its start, and b by as much before its end.
+/// Where |p| ≤ r - `margin` as computed here, the line does cross the sphere, for 32uR is more than δ and all
+/// roundings. The first crossing is then in range where b - √(s² - p²) is by `range_margin` after its start, and b by
+/// as much before its end.
 ///
 /// In double precision, adding the cloud's origin rounds centres once more: by 2⁻⁵³ of the origin's largest coordinate.
 /// Both margins include 2⁻⁴⁸ of it.
 ///
 /// If the computed |p| ≤ r - `margin`, the ray certainly crosses the sphere. The first crossing is at or after b -
-/// √(s² - p²), as shown above, and at or before b - √((r - `margin`)² - p²), which for the same reasons is no less, both as
-/// computed here and give or take (10.5 + 1 + 2 + 3)uR. Of two such spheres, one is certainly nearer if its latter
-/// value is by `range_margin` before the former value of the other: that is twice the error, and leaves 31uR for
+/// √(s² - p²), as shown above, and at or before b - √((r - `margin`)² - p²), which for the same reasons is no less,
+/// both as computed here and give or take (10.5 + 1 + 2 + 3)uR. Of two such spheres, one is certainly nearer if its
+/// latter value is by `range_margin` before the former value of the other: that is twice the error, and leaves 31uR for
 /// rounding.
 ///
 /// There is no relevant overflow or underflow if 2⁻⁴⁰ ≤ R ≤ 2⁶⁰ and the direction is neither absurdly long nor short;

@@ -139,7 +139,7 @@ const LINE_WORDS: usize = size_of::<Line>() / size_of::<u32>();
 /// Words of the longer block.
 pub(crate) const BLOCK_WORDS: usize = UNSHARED_LINES * LINE_WORDS;
 
-/// The first word of an axis's row in a block that shares vertices: a cache line, of which 1 to 14 are vertices.
+/// The first word of an axis's row in a block that shares vertices: a cache line, with 1 to 14 vertices.
 pub(crate) const fn shared_row(axis: usize) -> usize {
     LINE_WORDS * axis
 }

@@ -1,4 +1,4 @@
-"""Names: those that people try are answered with ours, and `help` shows what is for users."""
+"""Names: common wrong names are answered with the right ones, and `help` shows what is for users."""
 
 from __future__ import annotations
 

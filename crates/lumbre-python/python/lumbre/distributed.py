@@ -70,7 +70,7 @@ def render(
     frames : times in seconds, optional
         Of a file; a list of pictures is returned then.
     time : seconds, optional
-        Stops then, with as many samples as every pixel has: the picture is that of one machine for that spp.
+        Stops then, with the samples that every pixel has: the picture is that of one machine for that spp.
     samples_per_task, tile : optional
         How a render is cut: samples a pixel, and the side of square tiles. By default up to 32 tasks for each thread, 4 for those of
         thousands.
@@ -362,7 +362,7 @@ class _Runner:
     LEAST_PATIENCE = 2.0
     # So many answers are fetched at once: few trips, and little memory.
     BATCH = 64
-    # Times of as many tasks as say what is usual.
+    # Times of enough tasks to estimate the usual one.
     REMEMBERED = 255
 
     def __init__(self, client: Any, retries: int, patience: float | None, window: int) -> None:
@@ -385,7 +385,7 @@ class _Runner:
         call: Callable[[Any], tuple[Callable[..., Any], tuple[Any, ...]]],
         deadline: float | None,
     ) -> Iterator[tuple[Any, Any]]:
-        """Each task with its answer, as they come; those that are not done at the deadline are called off."""
+        """Each task with its answer, as they come; tasks that are not done at the deadline are cancelled."""
         rest = iter(tasks)
         looked = clock.monotonic()
         try:
@@ -455,7 +455,7 @@ class _Runner:
         return [future for future in ended if future.done()]
 
     def _answers(self, futures: list[Any], call: Callable[[Any], Any]) -> Iterator[tuple[Any, Any]]:
-        """The answers of those that have one; the others are given out again where that is due."""
+        """The answers that have arrived; overdue tasks are submitted again."""
         if not futures:
             return
         try:

@@ -102,7 +102,7 @@ class Image:
 
         Parameters
         ----------
-        layers : features to write beside the picture, in an .exr
+        layers : features to write with the picture, in an .exr
         tonemap : none, agx, aces or neutral, for .png and .jpg; exposure is in stops before it
             By default as the program has them: neutral in the light of its studio, else none; and no stops, unless the lights of a glTF
             would make its picture white or black.

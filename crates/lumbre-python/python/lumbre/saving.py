@@ -66,7 +66,7 @@ from .geometry import (
 
 
 def save(source: dict[str, Any], size: tuple[int, int], path: str | os.PathLike[str]) -> None:
-    """Writes a scene of shapes as a .pbrt, with its images and meshes beside it."""
+    """Writes a scene of shapes as a .pbrt, with its images and meshes next to it."""
     target = Path(os.fspath(path))
     if target.suffix != ".pbrt":
         raise LumbreError(f'{target}: a scene is saved as .pbrt (found "{target.suffix}")')
@@ -109,7 +109,7 @@ def _param(kind: str, name: str, values: Any) -> str:
 
 
 class _Writer:
-    """The parts of a file, and what is beside it."""
+    """The parts of a file, and the files next to it."""
 
     def __init__(self, target: Path) -> None:
         self.target = target
@@ -308,7 +308,7 @@ class _Writer:
         raise LumbreError(f"a shape of type {type(shape).__name__} is not saved: a .pbrt has no such shape")
 
     def mesh(self, mesh: Mesh) -> str:
-        """A binary PLY beside the file, in single precision."""
+        """A binary PLY next to the file, in single precision."""
         if mesh.colors is not None:
             raise LumbreError("a Mesh with colors is not saved: a .pbrt has no colours of vertices")
         vertices = mesh.vertices.astype(np.float32)

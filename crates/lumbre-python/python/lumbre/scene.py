@@ -1,4 +1,4 @@
-"""Scenes: opened from files or built of shapes, asked with rays and points, rendered."""
+"""Scenes: opened from files or built from shapes, queried with rays and points, rendered."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ Progress = Callable[[int, "int | None", float], object]
 
 
 class Hits:
-    """The closest hits of N rays, an array each; those that were not asked for raise `AttributeError`.
+    """The closest hits of N rays, one array per field; fields that were not requested raise `AttributeError`.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Hits:
     instance: Array
 
     def __init__(self, columns: dict[str, Array]) -> None:
-        # The columns are the attributes: nothing is sooner made, or found.
+        # The columns are the attributes: this is the fastest way.
         self.__dict__ = columns
 
     def __getattr__(self, name: str) -> Array:
@@ -195,7 +195,7 @@ class SceneMesh(metaclass=Described):
         As of `Hits`: the position of the shape in its scene, and the outermost instance, -1 where it is in none.
     vertices : (V, 3) float64
     faces : (F, 3) int64
-        Counter-clockwise from the front, in the order of `Hits.prim`; a quad is two triangles, after those that were triangles.
+        Counter-clockwise from the front, in the order of `Hits.prim`; a quad is two triangles, after the original triangles.
     normals : (V, 3) float64, or None
         Unit vectors for shading.
     uvs : (V, 2) float64, or None
@@ -240,17 +240,17 @@ class Scene:
     Parameters
     ----------
     shapes : shapes, `Instances`, other scenes, and meshes of trimesh
-        What stands there; of other scenes, all that they have, their lights and cameras, too. `Hits.shape` is the position among all
-        shapes, in this order, those of instances after the other shapes between two scenes.
+        The contents: `[Sphere(), other_scene, mesh]`. Other scenes bring their lights and cameras, too. `Hits.shape` is the position among
+        all shapes, in this order; shapes of instances come after the other shapes between two scenes.
     camera : Camera or list of them, optional
-        The first is the default; by default that of the first scene that has one, else one that sees everything.
+        The first is the default. Without any: that of the first scene with one, else one that frames everything.
     lights : list of lights, optional
         By default studio light, unless a shape emits. With neither camera nor light, everything also stands on its shadow in pictures.
     up : triple, optional
-        What is up for the default camera and light: by default what it is in the first scene among the shapes, else z.
+        The up direction of the default camera and light; by default that of the first scene among the shapes, else z.
 
     A scene does not change. It may be used from many threads at once, and is pickled by what it was made of. Queries release the
-    interpreter's lock, use every core (or as many as RAYON_NUM_THREADS says) and end on Ctrl-C.
+    interpreter's lock, use every core (or RAYON_NUM_THREADS) and end on Ctrl-C.
 
     >>> import lumbre
     >>> scene = lumbre.Scene([lumbre.Torus(major=1, minor=0.25), lumbre.Plane(point=(0, 0, -1))])
@@ -359,7 +359,7 @@ class Scene:
         >>> hits.t.tolist(), hits.point.tolist(), hits.front.tolist()
         ([3.0], [[0.0, 0.0, 2.0]], [True])
         """
-        # The usual arrays need no look from here, which takes longer than a ray.
+        # Fast path: checking costs more than a ray.
         if out is None and type(fields) is tuple and type(tmin) is float and type(tmax) is float:
             if type(origins) is _ndarray and type(directions) is _ndarray:
                 ready = self._native.cast_ready(origins, directions, tmin, tmax, fields)
@@ -379,7 +379,7 @@ class Scene:
         *,
         out: npt.NDArray[np.bool_] | None = None,
     ) -> npt.NDArray[np.bool_]:
-        """Whether anything is hit, (N,) of bool; arguments as for `cast`. Sooner known than what is hit first.
+        """Whether anything is hit, (N,) of bool; arguments as for `cast`. Faster than `cast`.
 
         >>> import lumbre
         >>> lumbre.Scene([lumbre.Sphere()]).occluded([[0.0, 0.0, 5.0]], [[0.0, 0.0, -1.0]], tmax=3.0).tolist()
@@ -438,7 +438,7 @@ class Scene:
     def closest_point(self, points: npt.ArrayLike, max_distance: float = math.inf) -> Nearest:
         """The nearest point of all surfaces, for (N, 3) points.
 
-        Where something may be nearer that has no answer, such as CSG, or some shapes under maps that change angles, the distance is nan,
+        If CSG, or a sheared shape, might be nearer, the distance is nan,
         `shape` -1, and a `UserWarning` says for how many points, and why.
 
         >>> import lumbre
@@ -457,7 +457,7 @@ class Scene:
         return Nearest({"distance" if name == "t" else name: column for name, column in columns.items()})
 
     def inside(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        """Whether (N, 3) points are inside of closed bodies, even-odd: inside of two is outside.
+        """Whether (N, 3) points are inside closed bodies, by the even-odd rule: a point inside two counts as outside.
 
         >>> import lumbre
         >>> lumbre.Scene([lumbre.Sphere(radius=2)]).inside([[0.0, 0.0, 1.0], [0.0, 0.0, 3.0]]).tolist()
@@ -526,7 +526,7 @@ class Scene:
         first_sample: int = 0,
         progress: Progress | bool | None = None,
     ) -> Image:
-        """Renders a picture, as the program does: a model by itself is framed, lit as in a studio, and stands on its shadow before paper.
+        """Renders a picture, as the program does: a bare model is framed, lit as in a studio, and casts a shadow on a paper background.
 
         Parameters
         ----------
@@ -544,7 +544,7 @@ class Scene:
         env : light from all around, in place of the scene's own
             A file or an (h, 2h, 3) array by longitude and latitude, its middle behind the model; an `EnvironmentLight` or `SkyLight` as
             it stands; a radiance; "studio"; or "none" besides the scene's own.
-        ground : "none", "shadow" (ground of which only the shadow is seen), "plane" (matt and grey) or "auto"
+        ground : "none", "shadow" (ground on which only shadows are visible), "plane" (matt and grey) or "auto"
         background : what is behind everything
             "env" (the light from there), "studio" (grey paper), "transparent", a colour, an (h, w, 3) array or a file.
         overrides : values by name, as the program's -D
@@ -612,7 +612,7 @@ class Scene:
         if min_spp is not None and noise is None:
             raise LumbreError("min_spp is for a render to a noise (expected noise as well)")
         if spp is None and noise is not None:
-            # As in the program: as many as it takes.
+            # As in the program: no limit.
             options["spp"] = 2**20
         elif spp is None and time is not None:
             options["spp"] = 2**32 - 1
@@ -625,7 +625,7 @@ class Scene:
         if stats["noise_target_met"] is False:
             more = "time" if time is not None and stats["spp"] < options["spp"] else "spp"
             reached = "not known yet" if stats["noise"] is None else stats["noise"]
-            warnings.warn(f"the noise is {reached}, and that of {noise} was not reached: more {more} goes on", stacklevel=3)
+            warnings.warn(f"the noise is {reached}, not below the target {noise}: give more {more}", stacklevel=3)
         return image
 
     @answers_names
@@ -647,7 +647,7 @@ class Scene:
         integrator: str | None = None,
         seed: int | None = None,
     ) -> Explanation:
-        """Tells how the colour of a pixel, or the light along a ray, comes about, with all numbers as the render computes them.
+        """Explains the colour of a pixel, or the light along a ray, with all numbers as the render computes them.
 
         Parameters
         ----------
@@ -655,10 +655,10 @@ class Scene:
         ray : (origin, direction), two triples, in place of a pixel; tmin and tmax are its range
         sample : the number of the sample
             The radiance is that which `render` adds to the pixel for it.
-        depth : of how many of the rays that follow the crossings are told, too
-        nearest : tell only the surface that is seen, not those behind it
-        shape : tell of this shape, whether the ray meets it or not: its number, its kind, or the name of its material
-        all_shapes : tell of all shapes, those that the ray misses too
+        depth : the number of further rays whose crossings are explained, too
+        nearest : explain only the visible surface, not those behind it
+        shape : explain this shape, whether the ray hits it or not: its number, its kind, or the name of its material
+        all_shapes : explain all shapes, also those that the ray misses
         lang : en or es
         size, camera, integrator, seed : as of `render`
 
@@ -672,7 +672,7 @@ class Scene:
         'shape 0'
         """
         if (pixel is None) == (ray is None):
-            raise LumbreError("either a pixel or a ray is explained")
+            raise LumbreError("expected either a pixel or a ray")
         options = _options({"size": size, "camera": camera, "integrator": integrator, "seed": seed})
         sample, depth = whole("sample", sample), whole("depth", depth)
         if pixel is not None:
@@ -685,7 +685,7 @@ class Scene:
         if ray is not None:
             origin, direction = triple("origin", ray[0]), triple("direction", ray[1])
             if not np.isfinite((origin, direction)).all() or not any(direction) or not tmin <= tmax:
-                raise LumbreError(f"this is no ray (found {ray} from {tmin} to {tmax}; expected finite numbers, and a direction)")
+                raise LumbreError(f"invalid ray (found {ray} from {tmin} to {tmax}; expected finite numbers, and a direction)")
             asked = (origin, direction, float(tmin), float(tmax))
         native = self._native
         told = None if shape is None else str(shape)
@@ -695,7 +695,7 @@ class Scene:
     def view(self, *, size: tuple[int, int] | None = None, spp: int | None = None, open: bool = True) -> Viewer:
         """Shows the scene in a page of the browser while it is rendered: `lumbre view`, from Python.
 
-        One moves the camera there, looks into pixels, and sees every edit of its files when it is saved. It runs beside what Python does;
+        One moves the camera there, looks into pixels, and sees every edit of its files when it is saved. It runs in the background;
         the other queries of the scene stay as they are.
 
         Parameters
@@ -717,7 +717,7 @@ class Scene:
         return viewer
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the scene as a .pbrt, which the program and `load` read; images and meshes are written beside it, under its name.
+        """Writes the scene as a .pbrt, which the program and `load` read; images and meshes are written next to it, under its name.
 
         A scene of a file is in that file. Raises `LumbreError` for what a .pbrt cannot hold, and says what that is: `Curves`, `Implicit`,
         patches, colours of vertices, several cameras, and scenes without a camera or light of their own. Meshes are rounded to single

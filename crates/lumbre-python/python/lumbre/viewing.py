@@ -17,7 +17,7 @@ class Viewer:
     """A page in the browser that shows a scene while it is rendered, until it is closed, forgotten, or Python ends.
 
     It listens on this machine alone, and lets in who has its address, which works once: what opens it goes on to work there. Use it in a
-    `with`, or call `close`. A notebook shows a small picture with the address beside it. The page is not put into the notebook, for no page
+    `with`, or call `close`. A notebook shows a small picture with the address next to it. The page is not put into the notebook, for no page
     of another server may frame it or lead to it, so that none can steer what it shows: type or copy the address.
 
     >>> import lumbre

@@ -27,7 +27,8 @@ impl Layer {
         self.known[half].iter().all(|&known| known == 1.0)
     }
 
-    /// The values of all pixels that are known, if they are the same in both halves: nothing is to be filtered. Black where none is known.
+    /// The values of all pixels that are known, if they are the same in both halves: nothing is to be filtered. Black
+    /// where none is known.
     fn constant(&self) -> Option<[f32; 3]> {
         let known = |half: usize| {
             let values = (0..self.width * self.height).filter(move |&i| self.known[half][i] == 1.0);
@@ -39,7 +40,7 @@ impl Layer {
     }
 }
 
-/// What tells surfaces apart: a group is compared as one.
+/// What distinguishes surfaces: a group is compared as one.
 pub(super) struct Group {
     pub(super) planes: Vec<Vec<f32>>,
     /// The variance of a pixel's values, summed over planes.
@@ -68,7 +69,8 @@ fn kernel(x: f32) -> f32 {
     t * t
 }
 
-/// The larger of two numbers; the second where one of them is NaN. (`max` asks for NaN, which vectors have no instruction for.)
+/// The larger of two numbers; the second where one of them is NaN. (`max` asks for NaN, which vectors have no
+/// instruction for.)
 #[inline(always)]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -96,7 +98,7 @@ pub(super) fn filter(
     InstructionSet::detect().run(FilterBlock { layer, groups, columns, rows, cancel })
 }
 
-/// [`filter_block`] at any instruction set: its loops go over rows of numbers, of which the compiler makes vectors as wide as there are.
+/// [`filter_block`] at any instruction set: its loops go over rows of numbers, which the compiler vectorizes.
 struct FilterBlock<'a> {
     layer: &'a Layer,
     groups: &'a [Group],
@@ -143,7 +145,8 @@ fn filter_block(
     let mut surfaces = vec![0.0; across_width];
     let mut weights = vec![0.0; across_width];
     let share = 1.0 / ((2 * PATCH + 1) * (2 * PATCH + 1)) as f32;
-    // Where a half says nothing of some pixels, these are compared with none, and a patch counts the pairs that it compares.
+    // Where a half says nothing of some pixels, these are compared with none, and a patch counts the pairs that it
+    // compares.
     let is_known = [0, 1].map(|half| layer.is_known(half));
     let mut pairs: [Vec<f32>; 2] =
         is_known.map(|known| vec![0.0; if known { 0 } else { reached.len() * across_width }]);
@@ -248,7 +251,7 @@ fn filter_block(
             }
         }
     }
-    // A half of which nothing is known leaves it to the other.
+    // A half without data leaves the weight to the other.
     array::from_fn(|c| {
         let mean = |i: usize| match (totals[0][i] > 0.0, totals[1][i] > 0.0) {
             (true, true) => 0.5 * (sums[0][c][i] / totals[0][i] + sums[1][c][i] / totals[1][i]),
@@ -260,7 +263,8 @@ fn filter_block(
     })
 }
 
-/// The squared differences of light of the pixels from `p` on and those from `q` on, less what noise makes of them, in units of it.
+/// The squared differences of light of the pixels from `p` on and those from `q` on, less what noise makes of them, in
+/// units of it.
 #[inline(always)]
 fn compare_light(half: &[Vec<f32>; 3], variance: &[f32], p: usize, q: usize, out: &mut [f32]) {
     let span = out.len();
@@ -275,7 +279,8 @@ fn compare_light(half: &[Vec<f32>; 3], variance: &[f32], p: usize, q: usize, out
     }
 }
 
-/// The greatest squared difference of any group of features of the pixels from `p` on and those from `q` on, in units of each group.
+/// The greatest squared difference of any group of features of the pixels from `p` on and those from `q` on, in units
+/// of each group.
 #[inline(always)]
 fn compare_surfaces(groups: &[Group], p: usize, q: usize, out: &mut [f32]) {
     let span = out.len();
@@ -304,8 +309,8 @@ fn compare_surfaces(groups: &[Group], p: usize, q: usize, out: &mut [f32]) {
     }
 }
 
-/// For each of `out`, the sum of a value and its neighbours to the left and the right, as far as patches reach and there are any. The value
-/// of the first is `values[first]`.
+/// For each of `out`, the sum of a value and its neighbours to the left and the right, as far as patches reach and
+/// there are any. The value of the first is `values[first]`.
 #[inline(always)]
 fn sum_across(values: &[f32], first: usize, out: &mut [f32]) {
     let inside = PATCH.saturating_sub(first)..(values.len() - first).saturating_sub(PATCH).min(out.len());

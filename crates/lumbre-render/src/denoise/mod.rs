@@ -1,9 +1,10 @@
 //! Less noise without more samples: a filter of the picture that knows what every pixel shows, and how sure it is.
 //!
-//! What is filtered is light over reflectance, so that textures stay as they are. Pixels are averaged that show the same surface and
-//! whose neighbourhoods are the same but for noise (non-local means); the samples are in two halves, each of which is averaged by
-//! weights from the other, so that no noise chooses itself (F. Rousselle, M. Manzi, M. Zwicker, "Robust Denoising using Feature and
-//! Color Information", Computer Graphics Forum 32, 2013). Where they choose among three filters by an estimate of the error, here is one.
+//! What is filtered is light over reflectance, so that textures stay as they are. Pixels are averaged that show the
+//! same surface and whose neighbourhoods are the same but for noise (non-local means); the samples are in two halves;
+//! each is averaged by weights from the other, so that no noise chooses itself (F. Rousselle, M. Manzi, M. Zwicker,
+//! "Robust Denoising using Feature and Color Information", Computer Graphics Forum 32, 2013). Where they choose among
+//! three filters by an estimate of the error, here is one.
 
 mod means;
 mod planes;
@@ -25,38 +26,39 @@ const MIN_GROUND: f32 = 1e-3;
 /// Columns and rows of the blocks that a picture is filtered in.
 const BLOCK: (usize, usize) = (256, 64);
 
-/// Bytes that the filter needs for a picture of this many pixels, on this many threads: the denoised picture, and for each thread the planes of
-/// a block.
+/// Bytes that the filter needs for a picture of this many pixels, on this many threads: the denoised picture, and for
+/// each thread the planes of a block.
 pub(crate) fn memory_bytes(pixels: u64, threads: usize) -> u64 {
     // Colours, coverage by colour, alpha.
     const DENOISED: u64 = 2 * size_of::<Rgb>() as u64 + size_of::<f32>() as u64;
-    // Two halves of three channels, what is known of them, variances and how they come about; features, their variance and sharpness.
+    // Two halves of three channels, what is known of them, variances and how they come about; features, their variance
+    // and sharpness.
     const PLANES: usize = 4 * (2 * 3 + 2 + 1 + 12 + 13);
     let block = (BLOCK.0 + 2 * BORDER) * (BLOCK.1 + 2 * BORDER) * (size_of::<GuideSums>() + PLANES);
     let blocks = block as u64 * threads.max(1) as u64;
     pixels.saturating_mul(DENOISED).saturating_add(blocks)
 }
 
-/// A picture without noise.
+/// A denoised picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Denoised {
-    /// The pixels, with coverage where the rendered picture has it.
+    /// The pixels, with alpha if the rendered picture has it.
     pub image: Image,
-    /// Coverage by colour, where the rendered picture has it: [`Rendered::coverage`].
+    /// Coverage by channel, if the rendered picture has it: [`Rendered::coverage`].
     pub coverage: Option<Image>,
 }
 
-/// Takes the noise out of a picture that was rendered with [`crate::RenderOptions::guides`], on this many threads, 0 for one a core; the
-/// pixels do not depend on it. `None` where there are no guides, and where there is no whole picture.
+/// Denoises a picture that was rendered with [`crate::RenderOptions::guides`], on this many threads (0 for one per
+/// core; pixels do not depend on it). `None` without guides or without a whole picture.
 ///
-/// Pixels whose samples all agree, and that look like no other, stay as they are. Coverage is filtered only where the ground catches
-/// shadows, so that outlines stay sharp. A picture that has one sample for squares of pixels ([`crate::Stats::stride`]) is filtered as the small
-/// picture that it is, and enlarged.
+/// Pixels whose samples all agree and that resemble no other pixel are unchanged. Coverage is filtered only on shadow
+/// catchers, so that outlines stay sharp. A coarse picture ([`crate::Stats::stride`]) is filtered at its small size,
+/// then enlarged.
 pub fn denoise(rendered: &Rendered, threads: usize) -> Option<Denoised> {
     denoise_unless(rendered, threads, &CancelToken::new())
 }
 
-/// The same, unless it is cancelled: `None` soon after that.
+/// The same, unless it is cancelled: then `None`, soon.
 pub fn denoise_unless(rendered: &Rendered, threads: usize, cancel: &CancelToken) -> Option<Denoised> {
     let guides = rendered.guides.as_ref()?;
     let workers = Workers::start(threads);
@@ -89,13 +91,13 @@ pub fn denoise_unless(rendered: &Rendered, threads: usize, cancel: &CancelToken)
     }
 }
 
-/// What is filtered.
+/// The input of the filter.
 struct Noisy<'a> {
     image: &'a Image,
     coverage: Option<&'a Image>,
     guides: &'a Guides,
     bounds: PixelBounds,
-    /// Columns and rows of its blocks, which do not show.
+    /// Columns and rows of its blocks; they do not affect the result.
     block: (usize, usize),
 }
 
@@ -103,7 +105,7 @@ struct Noisy<'a> {
 struct Band<'a> {
     y0: u32,
     pixels: &'a mut [Rgb],
-    /// Empty where coverage stays as it is.
+    /// Empty if coverage is not filtered.
     coverage: &'a mut [Rgb],
 }
 
@@ -167,7 +169,7 @@ impl Noisy<'_> {
         }
     }
 
-    /// Filters a block by what is around it.
+    /// Filters a block with its surroundings.
     fn fill_block(
         &self,
         band: &mut Band<'_>,
@@ -190,7 +192,7 @@ impl Noisy<'_> {
             })
         };
 
-        // Where a picture is transparent, there is no light of what lets one through.
+        // Pixels that show only the background of a transparent picture take no part.
         let is_everywhere = self.image.alpha().is_none();
         let kind = Kind { least: MIN_REFLECTANCE, is_everywhere, is_single };
         let layer = planes::layer(&guides, size, |guide| &guide.light, kind);
@@ -213,7 +215,7 @@ impl Noisy<'_> {
                 (Some(coverage), _) => coverage.pixels()[at],
                 (None, alpha) => Rgb::splat(alpha.map_or(1.0, |alpha| alpha[at])),
             };
-            // What is not ground, and covers as it did, and what is.
+            // The part that is not on the shadow catcher keeps its coverage.
             let channel = |c: usize, before: f32| {
                 let ground = share(guide.count, &guide.shadow, c, MIN_GROUND);
                 // The noisy shadow was clamped in the picture, and is not here: where it is negative, light is focused.
@@ -227,7 +229,7 @@ impl Noisy<'_> {
     }
 }
 
-/// What the ratio of a pixel is multiplied by again.
+/// The denominator of a pixel's ratio, at least `least`; 0 if the pixel takes no part.
 fn share<const UNDER: usize>(count: Count, sums: &RatioSums<UNDER>, c: usize, least: f32) -> f32 {
     let has_part = count.weight > 0.0 && !sums.is_absent(c);
     if has_part { sums.denominator(c, count).max(least) } else { 0.0 }
@@ -244,7 +246,7 @@ fn smaller(image: &Image, side: u32) -> Option<Image> {
     small.with_alpha(places().map(at).collect())
 }
 
-/// An image of which each pixel is the first of a square of `side` by `side` pixels; those between are between them.
+/// An image interpolated from one pixel per square of `side` by `side` pixels.
 fn larger(small: &Image, (width, height): (u32, u32), side: u32) -> Option<Image> {
     // Two neighbours and the share of the second.
     let along = |x: u32, count: u32| {

@@ -1,30 +1,30 @@
-//! What the film keeps of pixels as planes of numbers, with variances that are less noisy than single ones.
+//! Guides as planes of numbers, with smoothed variances.
 
 use crate::denoise::means::{Group, Layer, REACH};
 use crate::film::{GROUPS, GuideSums, RatioSums};
 
-/// Pixels around one whose variances are averaged.
+/// Radius in pixels over which variances are averaged.
 const VARIANCE_RADIUS: usize = 2;
-/// Pixels around one in which the samples of a low-discrepancy sampler are found to be better than independent ones.
+/// Radius in pixels for measuring how much better a low-discrepancy sampler is than independent samples.
 const SCALE_RADIUS: usize = 5;
-/// Pixels around one whose spread stands for the variance of a single sample.
+/// Radius in pixels whose spread estimates the variance of a single sample.
 const SPREAD_RADIUS: usize = 2;
 
-/// Pixels beyond one that its mean depends on.
+/// Radius in pixels on which a mean depends.
 pub(super) const BORDER: usize = REACH + SCALE_RADIUS + OUTLIER_RADIUS;
 
-/// What a layer is made of.
+/// The settings of a layer.
 #[derive(Clone, Copy)]
 pub(super) struct Kind {
-    /// The least mean denominator.
+    /// Minimum mean denominator.
     pub(super) least: f32,
-    /// Whether all pixels have a part in it; else those without say nothing.
+    /// Whether all pixels take part; otherwise pixels without a denominator have no data.
     pub(super) is_everywhere: bool,
     /// Whether no pixel of the picture has more than one sample.
     pub(super) is_single: bool,
 }
 
-/// A ratio of every pixel by two halves of its samples.
+/// A ratio for every pixel, for two halves of its samples.
 pub(super) fn layer<const UNDER: usize>(
     guides: &[GuideSums],
     size: (usize, usize),
@@ -55,7 +55,7 @@ pub(super) fn layer<const UNDER: usize>(
         let is_known = |guide: &GuideSums| is_everywhere || ratio(guide).is_known(half, guide.count);
         guides.iter().map(|guide| if is_known(guide) { 1.0 } else { 0.0 }).collect::<Vec<f32>>()
     });
-    // The mean variance of those pixels that have one.
+    // The mean variance of pixels that have one.
     let has_part: Vec<f32> = known[0].iter().zip(&known[1]).map(|(a, b)| a.max(*b)).collect();
     let parts = mean_around(&has_part, size, VARIANCE_RADIUS);
     let mut smooth = mean_around(&by_samples, size, VARIANCE_RADIUS);
@@ -71,7 +71,7 @@ pub(super) fn layer<const UNDER: usize>(
         (0..guides.len())
             .map(|i| {
                 let scale = if wide_samples[i] > 0.0 { wide_halves[i] / wide_samples[i] } else { 1.0 };
-                // That of a half is twice that of the whole.
+                // The variance of a half is twice that of the whole.
                 2.0 * smooth[i] * scale.clamp(0.1, 2.0)
             })
             .collect()
@@ -79,15 +79,15 @@ pub(super) fn layer<const UNDER: usize>(
     Layer { width: size.0, height: size.1, halves, variance, known }
 }
 
-/// Pixels around one in which the other half says how bright it may be.
+/// Radius in pixels in which the other half limits the brightness.
 const OUTLIER_RADIUS: usize = 5;
-/// A pixel of one half that is brighter than this many pixels of that neighbourhood in the other half is an outlier: a fifth of its
-/// 121 pixels.
+/// A pixel of one half that is brighter than this many pixels of that neighbourhood in the other half is an outlier: a
+/// fifth of its 121 pixels.
 const OUTLIER: f32 = 24.0;
-/// Unless the other half has nearly as much beside it.
+/// Unless the other half has nearly as much next to it.
 const CONFIRMED: f32 = 4.0;
 
-/// Dims pixels of one half by which means would be little else than one sample, of which the other half knows nothing. All other light
+/// Dims pixels of one half where means would be dominated by one sample that the other half lacks. All other light
 /// is kept. Returns the factor of each pixel.
 fn limit_outliers(halves: &mut [[Vec<f32>; 3]; 2], size: (usize, usize)) -> Vec<f32> {
     let brightness = halves
@@ -108,7 +108,7 @@ fn limit_outliers(halves: &mut [[Vec<f32>; 3]; 2], size: (usize, usize)) -> Vec<
                 &brightness[other][y * width + x.saturating_sub(1)..y * width + (x + 2).min(width)]
             });
             let limit = limit.max(CONFIRMED * beside.copied().fold(0.0, f32::max));
-            // Where all around is black, nothing is known.
+            // If the neighbourhood is black, there is no estimate.
             if 0.0 < limit && limit < value {
                 halves[half].iter_mut().for_each(|channel| channel[i] *= limit / value);
                 kept[i] = limit / value;
@@ -132,7 +132,7 @@ fn spread(channels: &[Vec<f32>; 3], size: (usize, usize)) -> Vec<f32> {
     all
 }
 
-/// Albedo, normals and depth, and from where on they are different.
+/// Albedo, normals and depth, with the differences from which on they count as different.
 pub(super) fn surfaces(guides: &[GuideSums], size: (usize, usize)) -> Vec<Group> {
     let value = |f: usize| -> Vec<f32> { guides.iter().map(|guide| guide.feature(f)).collect() };
     let group = |which: usize, least: &dyn Fn(usize) -> f32| {
@@ -156,18 +156,18 @@ pub(super) fn surfaces(guides: &[GuideSums], size: (usize, usize)) -> Vec<Group>
 
 /// Differences of features are compared with this many standard deviations, or slopes.
 const STRENGTH: f32 = 1.0;
-/// The square of a difference of albedo, over three channels, that says little: textures are divided out.
+/// The square of an insignificant difference of albedo, over three channels: textures are divided out.
 const MIN_ALBEDO: f32 = 0.01;
 /// The square of a difference of normals.
 const MIN_NORMAL: f32 = 0.01;
 /// A difference of depth, as a share of it.
 const MIN_DEPTH: f32 = 0.01;
 
-/// Pixels over which a slope goes on, so that it is none of the narrow ramp that the film's filter makes of an edge.
+/// Minimum pixels of a slope, to distinguish it from the narrow ramp that the film's filter makes of an edge.
 const SLOPE: usize = 3;
 
-/// The square of the slope at a pixel, a pixel far: to the side that is more alike, and no more than that of the pixels that follow, so
-/// that edges are none.
+/// The square of the slope per pixel: towards the more similar side, and at most that of the following pixels, so that
+/// edges do not count as slopes.
 fn slope_squared(plane: &[f32], (width, height): (usize, usize), i: usize) -> f32 {
     let (x, y) = (i % width, i / width);
     // The slope to one side, which has `count` pixels, `step` apart.
@@ -182,7 +182,7 @@ fn slope_squared(plane: &[f32], (width, height): (usize, usize), i: usize) -> f3
     square(across) + square(down)
 }
 
-/// The mean of each pixel's square of neighbours, as far as they are in the picture.
+/// The mean of each pixel's square of neighbours within the picture.
 fn mean_around(values: &[f32], (width, height): (usize, usize), radius: usize) -> Vec<f32> {
     let mut rows = Vec::with_capacity(values.len());
     for row in values.chunks_exact(width.max(1)) {

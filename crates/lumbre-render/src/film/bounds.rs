@@ -1,6 +1,6 @@
 //! A rectangle of pixels.
 
-/// Pixels at most.
+/// Maximum number of pixels.
 pub(crate) const MAX_PIXELS: u64 = 1 << 30;
 
 /// The pixels `x0 <= x < x1`, `y0 <= y < y1`, from the upper left of the whole picture.
@@ -10,9 +10,9 @@ pub struct PixelBounds {
     pub x0: u32,
     /// The first row.
     pub y0: u32,
-    /// Beyond the last column.
+    /// One past the last column.
     pub x1: u32,
-    /// Beyond the last row.
+    /// One past the last row.
     pub y1: u32,
 }
 
@@ -22,27 +22,27 @@ impl PixelBounds {
         Self { x0: 0, y0: 0, x1: width, y1: height }
     }
 
-    /// Pixels across.
+    /// Width in pixels.
     pub fn width(&self) -> u32 {
         self.x1.saturating_sub(self.x0)
     }
 
-    /// Pixels down.
+    /// Height in pixels.
     pub fn height(&self) -> u32 {
         self.y1.saturating_sub(self.y0)
     }
 
-    /// How many pixels.
+    /// Number of pixels.
     pub fn area(&self) -> u64 {
         u64::from(self.width()) * u64::from(self.height())
     }
 
-    /// Whether it holds no pixel.
+    /// Whether it is empty.
     pub fn is_empty(&self) -> bool {
         self.area() == 0
     }
 
-    /// What both hold.
+    /// The intersection.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl PixelBounds {
         }
     }
 
-    /// The smallest that holds both.
+    /// The smallest rectangle that contains both.
     #[must_use]
     pub fn hull(&self, other: &Self) -> Self {
         if self.is_empty() || other.is_empty() {
@@ -83,7 +83,7 @@ impl PixelBounds {
         .collect()
     }
 
-    /// The position of a pixel of it among all, row by row.
+    /// The index of a pixel among all of its pixels, row by row.
     pub fn position(&self, x: u32, y: u32) -> usize {
         (y - self.y0) as usize * self.width() as usize + (x - self.x0) as usize
     }

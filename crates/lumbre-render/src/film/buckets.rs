@@ -14,7 +14,7 @@ pub struct SpectralSample {
     pub radiance: [f32; 3],
 }
 
-/// Sums of one pixel for one range of wavelengths, which do not depend on the order that they were added in.
+/// Sums of one pixel for one range of wavelengths, independent of their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BucketSums {
     /// Σ weight × radiance of the wavelengths in the range.
@@ -40,7 +40,7 @@ impl BucketSums {
         self.weight.merge(other.weight);
     }
 
-    /// The mean radiance; 0 where there is no sample.
+    /// The mean radiance; 0 without a sample.
     pub fn mean(&self) -> f32 {
         let weight = self.weight.value();
         if weight == 0.0 { 0.0 } else { (self.radiance.value() / weight) as f32 }
@@ -53,14 +53,14 @@ impl Sums for BucketSums {
     }
 }
 
-/// The name of the channel of a range, as the layout of spectral OpenEXR files has it, with a comma for the decimal point: A. Fichet,
-/// R. Pacanowski, A. Wilkie, "An OpenEXR Layout for Spectral Images", JCGT 10(3), 2021.
+/// The name of the channel of a range, as the layout of spectral OpenEXR files has it, with a comma for the decimal
+/// point: A. Fichet, R. Pacanowski, A. Wilkie, "An OpenEXR Layout for Spectral Images", JCGT 10(3), 2021.
 pub(crate) fn channel_name(buckets: &Buckets, part: usize) -> String {
     let middle = format!("{:.3}", buckets.middle(part)).replace('.', ",");
     format!("S0.{middle}nm")
 }
 
-/// What a file says of these channels, by the same layout.
+/// The attributes of a file with these channels, in the same layout.
 pub(crate) const ATTRIBUTES: [(&str, &str); 2] =
     [("spectralLayoutVersion", "1.0"), ("emissiveUnits", "W.m^-2.sr^-1")];
 

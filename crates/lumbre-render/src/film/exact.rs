@@ -1,11 +1,11 @@
-//! Sums that do not depend on the order of what is added.
+//! Sums that do not depend on the order of their addends.
 
-/// A sum of numbers in fixed point. Adding to it is exact, so that in any order and grouping the same numbers come to the same bits:
-/// what is rounded is each number, once, to a multiple of 2⁻⁶³ (1.1 · 10⁻¹⁹).
+/// A sum of numbers in fixed point. Each number is rounded once, to a multiple of 2⁻⁶³ (1.1 · 10⁻¹⁹);
+/// additions are exact. So the same numbers give the same bits in any order and grouping.
 ///
 /// Sixteen million numbers of at most [`ExactSum::LIMIT`] fit; beyond that it stays at its largest value.
 ///
-/// It is aligned as eight bytes are, so that a pixel of seven of them and two counts has no gap.
+/// It is aligned to eight bytes, so that a pixel of seven sums and two counts has no padding.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(Rust, packed(8))]
 pub struct ExactSum(i128);
@@ -29,7 +29,7 @@ impl ExactSum {
         self.0 = self.0.saturating_add(fixed(number));
     }
 
-    /// Adds what another sum holds.
+    /// Adds another sum.
     #[inline]
     pub fn merge(&mut self, other: Self) {
         self.0 = self.0.saturating_add(other.0);
@@ -52,7 +52,8 @@ impl ExactSum {
     }
 }
 
-/// A number in units of 2⁻⁶³, halves rounded away from zero. By its bits: conversions of floating-point numbers to 128 bits are slow.
+/// A number in units of 2⁻⁶³, halves rounded away from zero. It works on the bits, because conversions
+/// from floating point to 128-bit integers are slow.
 #[inline]
 fn fixed(number: f64) -> i128 {
     const MANTISSA: i32 = 52;

@@ -32,7 +32,7 @@ pub enum FilterShape {
 }
 
 impl FilterShape {
-    /// Its value at a distance from the middle of the pixel.
+    /// Its value at a distance from the centre of the pixel.
     pub fn value(&self, x: f64, radius: f64) -> f64 {
         let x = x.abs();
         if x > radius {
@@ -69,7 +69,7 @@ fn sinc(x: f64) -> f64 {
 /// A position in the filter, and the sample's weight there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
-    /// From the middle of the pixel, in pixels.
+    /// Offset from the centre of the pixel, in pixels.
     pub offset: DVec2,
     /// Value over density: almost constant except for its sign.
     pub weight: f64,
@@ -103,7 +103,7 @@ impl Axis {
     /// `None` if the function is zero.
     fn new(shape: FilterShape, radius: f64) -> Option<Self> {
         let value = |i: f64| shape.value((i / CELLS as f64 * 2.0 - 1.0) * radius, radius);
-        // Not the middle alone: where the function changes sign, it may be zero only there.
+        // Not only at the centre: where the function changes sign, it may be zero only there.
         let cell = |i: f64| 0.25 * value(i).abs() + 0.5 * value(i + 0.5).abs() + 0.25 * value(i + 1.0).abs();
         let cells: Vec<f64> = (0..CELLS).map(|i| cell(i as f64)).collect();
         let choice = PiecewiseConstant1D::new(&cells)?;

@@ -1,13 +1,13 @@
-//! What the denoiser needs of the samples of one pixel besides their mean.
+//! The denoiser's statistics of the samples of one pixel.
 
 use std::ops::Range;
 
 use crate::film::FeatureSample;
 
-/// Sums for a ratio of two means by samples: its value, its variance, and its value by every other sample alone. The numerator has three
-/// channels, the denominator `UNDER` of them: three, or one for all.
+/// Sums for a ratio of two means over samples: its value, its variance, and its value for even and for odd samples. The
+/// numerator has three channels, the denominator `UNDER` of them: three, or one for all.
 ///
-/// Single precision is enough: all of it is compared with noise.
+/// Single precision is enough, because all of it is compared with noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RatioSums<const UNDER: usize> {
     /// Σ numerator.
@@ -61,7 +61,7 @@ impl<const UNDER: usize> RatioSums<UNDER> {
         }
     }
 
-    /// Which denominator is that of a channel.
+    /// The index of a channel's denominator.
     fn under(c: usize) -> usize {
         c.min(UNDER - 1)
     }
@@ -76,7 +76,8 @@ impl<const UNDER: usize> RatioSums<UNDER> {
         self.over[c] / self.under[Self::under(c)].max(least * count.weight)
     }
 
-    /// Whether the even samples (0) or the odd ones (1) have a numerator or a denominator; with a single sample, that one for both.
+    /// Whether the even samples (0) or the odd ones (1) have a numerator or a denominator; a single sample counts for
+    /// both.
     pub fn is_known(&self, half: usize, count: Count) -> bool {
         let is_odd = half == 1 && count.samples > 1;
         let sum = |all: f32, odd: f32| if is_odd { odd } else { all - odd };
@@ -86,12 +87,12 @@ impl<const UNDER: usize> RatioSums<UNDER> {
         })
     }
 
-    /// Whether neither numerator nor denominator is there: the pixel has no part in the ratio.
+    /// Whether there is neither numerator nor denominator: the pixel does not take part in the ratio.
     pub fn is_absent(&self, c: usize) -> bool {
         self.over[c] == 0.0 && self.under[Self::under(c)] == 0.0
     }
 
-    /// The ratio by the even samples and that by the odd ones; that of all where there are none of them.
+    /// The ratio of the even samples and that of the odd ones; that of all samples if there are none of a kind.
     pub fn halves(&self, c: usize, count: Count, least: f32) -> [f32; 2] {
         let odd = count.samples / 2;
         if odd == 0 {
@@ -106,15 +107,15 @@ impl<const UNDER: usize> RatioSums<UNDER> {
         ]
     }
 
-    /// The variance of the ratio, as if samples were independent (W. Cochran, "Sampling Techniques", 1977, 6.4). `None` for fewer than
-    /// two samples.
+    /// The variance of the ratio, as if samples were independent (W. Cochran, "Sampling Techniques", 1977, 6.4). `None`
+    /// for fewer than two samples.
     pub fn variance(&self, c: usize, count: Count, least: f32) -> Option<f32> {
         if count.samples < 2 {
             return None;
         }
         let n = count.samples as f32;
         let under = self.under[Self::under(c)].max(least * count.weight);
-        // Where the denominator is not that of the samples, it has no share in the variance.
+        // A denominator that was raised to `least` does not vary with the samples.
         let squares = if under > self.under[Self::under(c)] {
             self.over_squares[c] - self.over[c] * self.over[c] / n
         } else {
@@ -126,7 +127,7 @@ impl<const UNDER: usize> RatioSums<UNDER> {
     }
 }
 
-/// How many samples were added.
+/// The samples that were added.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Count {
     /// Their number.
@@ -135,10 +136,10 @@ pub struct Count {
     pub weight: f32,
 }
 
-/// What tells one surface from another, as numbers: albedo, normal, depth.
+/// What distinguishes surfaces, as numbers: albedo, normal, depth.
 pub const FEATURES: usize = 7;
 
-/// Which features are compared as one: albedo, normal, depth.
+/// The groups of features that are compared as one: albedo, normal, depth.
 pub const GROUPS: [Range<usize>; 3] = [0..3, 3..6, 6..FEATURES];
 
 /// Sums over the samples of one pixel.
@@ -146,15 +147,15 @@ pub const GROUPS: [Range<usize>; 3] = [0..3, 3..6, 6..FEATURES];
 pub struct GuideSums {
     /// Light over reflectance.
     pub light: RatioSums<3>,
-    /// How much of the ground is in shadow, over how much of the pixel is ground: where shadows are caught in a transparent picture.
+    /// The shadow on a shadow catcher over the pixel's share of it, in a transparent picture.
     pub shadow: RatioSums<1>,
-    /// What the samples met.
+    /// Features of the hits.
     pub surfaces: GuideSurfaceSums,
-    /// How many samples.
+    /// Number of samples.
     pub count: Count,
 }
 
-/// Sums over what the samples of one pixel met.
+/// Sums over the hits of the samples of one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuideSurfaceSums {
     features: [f32; FEATURES],
@@ -163,7 +164,7 @@ pub struct GuideSurfaceSums {
 }
 
 impl GuideSurfaceSums {
-    /// Adds what a sample met; `None` met nothing.
+    /// Adds the hit of a sample; `None` for a miss.
     pub fn add(&mut self, sample: Option<&FeatureSample>) {
         let Some(FeatureSample { albedo, normal, depth, .. }) = sample else { return };
         let values = [albedo.r, albedo.g, albedo.b, normal[0], normal[1], normal[2], *depth];
@@ -201,7 +202,7 @@ impl GuideSums {
         ratios.chain(features).chain(std::iter::once(&mut self.count.weight))
     }
 
-    /// Its numbers, as they are.
+    /// Its numbers, as bits.
     pub(crate) fn words(&self) -> [u32; WORDS] {
         let mut words = [self.count.samples; WORDS];
         let mut own = *self;
@@ -209,7 +210,7 @@ impl GuideSums {
         words
     }
 
-    /// That of these numbers.
+    /// The inverse of the above.
     pub(crate) fn of_words(words: [u32; WORDS]) -> Self {
         let mut own = Self::default();
         own.numbers().zip(words).for_each(|(number, word)| *number = f32::from_bits(word));
@@ -222,7 +223,8 @@ impl GuideSums {
         self.surfaces.features[i] / self.count.samples.max(1) as f32
     }
 
-    /// The variance of the means of a group, summed over its features, as if samples were independent; 0 for fewer than two samples.
+    /// The variance of the means of a group, summed over its features, as if samples were independent; 0 for fewer than
+    /// two samples.
     pub fn group_variance(&self, group: usize) -> f32 {
         if self.count.samples < 2 {
             return 0.0;

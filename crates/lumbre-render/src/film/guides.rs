@@ -1,4 +1,4 @@
-//! What the denoiser needs of a picture.
+//! The denoiser's guides of a picture.
 
 use crate::film::{Extras, GuideSums, PixelBounds, Tile};
 
@@ -9,7 +9,7 @@ pub struct Guides {
 }
 
 impl Guides {
-    /// Those of some tiles.
+    /// The guides of some tiles.
     pub(crate) fn new<'t>(tiles: impl Iterator<Item = &'t Tile>) -> Self {
         Self { tiles: tiles.cloned().collect() }
     }
@@ -19,7 +19,7 @@ impl Guides {
         self.tiles.iter().flat_map(Tile::guides)
     }
 
-    /// The guides of a rectangle of pixels, row by row; those of no sample where there is no pixel.
+    /// The guides of a rectangle of pixels, row by row; empty ones outside the picture.
     pub fn within(&self, bounds: PixelBounds) -> Vec<GuideSums> {
         let mut guides = vec![GuideSums::default(); bounds.area() as usize];
         for tile in &self.tiles {
@@ -34,7 +34,8 @@ impl Guides {
         guides
     }
 
-    /// The guides of the first pixel of each square of `side` by `side` pixels of a picture, as those of a small picture.
+    /// The guides of the first pixel of each square of `side` by `side` pixels of a picture, as those of a small
+    /// picture.
     pub(crate) fn smaller(&self, bounds: PixelBounds, side: u32) -> Self {
         let small = PixelBounds::whole(bounds.width().div_ceil(side), bounds.height().div_ceil(side));
         let mut film = Tile::new(small, Extras { guides: true, ..Extras::default() });
@@ -49,7 +50,7 @@ impl Guides {
         Self { tiles: vec![film] }
     }
 
-    /// Those of these tiles, to be changed.
+    /// The guides of these tiles, mutable.
     #[cfg(test)]
     pub(crate) fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles

@@ -1,8 +1,8 @@
 //! Samples become pixels.
 //!
 //! A pixel is a function of its own samples alone: the filter is sampled, so that no sample reaches a neighbour
-//! (Ernst, Stamminger, Greiner, "Filter Importance Sampling", IEEE Symposium on Interactive Ray Tracing, 2006). Sums are
-//! exact ([`ExactSum`]), so that they do not depend on the order of samples, nor on how these were shared out.
+//! (Ernst, Stamminger, Greiner, "Filter Importance Sampling", IEEE Symposium on Interactive Ray Tracing, 2006). Sums
+//! are exact ([`ExactSum`]), so that they do not depend on the order and distribution of samples.
 
 mod bounds;
 mod buckets;

@@ -1,11 +1,11 @@
-//! Sums that most tiles have none of.
+//! Sums that most tiles do not have.
 
-/// A value for each pixel of a tile, which take no memory as long as all are the default.
+/// A value for each pixel of a tile, without memory as long as all are the default.
 #[derive(Clone, Debug)]
 pub(super) struct Sparse<T> {
-    /// How many; 0 where they are not wanted.
+    /// Number of values; 0 if they are not requested.
     len: usize,
-    /// Empty, or as many.
+    /// Empty, or one per pixel.
     values: Vec<T>,
 }
 
@@ -18,21 +18,21 @@ impl<T: Copy + Default + PartialEq> Sparse<T> {
         self.len
     }
 
-    /// Whether any is not the default.
+    /// Whether any value is not the default.
     pub(super) fn is_used(&self) -> bool {
         self.values.iter().any(|value| *value != T::default())
     }
 
-    /// That of a pixel; the default where none is wanted.
+    /// The value of a pixel; the default if values are not requested.
     #[inline]
     pub(super) fn get(&self, at: usize) -> T {
         self.values.get(at).copied().unwrap_or_default()
     }
 
-    /// That of a pixel, to be changed to other than the default.
+    /// The value of a pixel, mutable.
     ///
     /// # Panics
-    /// Where none is wanted.
+    /// If values are not requested.
     #[inline]
     pub(super) fn get_mut(&mut self, at: usize) -> &mut T {
         if self.values.is_empty() {
@@ -41,7 +41,7 @@ impl<T: Copy + Default + PartialEq> Sparse<T> {
         &mut self.values[at]
     }
 
-    /// Sets that of a pixel, if any is wanted.
+    /// Sets the value of a pixel, if values are requested.
     pub(super) fn set(&mut self, at: usize, value: T) {
         let is_stored = !self.values.is_empty() || value != T::default();
         if at < self.len && is_stored {
@@ -49,7 +49,7 @@ impl<T: Copy + Default + PartialEq> Sparse<T> {
         }
     }
 
-    /// All of them.
+    /// All values.
     pub(super) fn iter(&self) -> impl Iterator<Item = T> + '_ {
         (0..self.len).map(|at| self.get(at))
     }
@@ -77,7 +77,7 @@ mod tests {
         assert!(values.is_used() && values != Sparse::new(5));
         values.set(3, 0);
         values.set(2, 0);
-        // The same numbers, in whatever memory.
+        // The same numbers, in either representation.
         assert!(!values.is_used() && values == Sparse::new(5) && values != Sparse::new(4));
         let mut none = Sparse::<u32>::new(0);
         none.set(0, 6);

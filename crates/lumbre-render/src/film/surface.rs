@@ -1,4 +1,4 @@
-//! What samples see of surfaces: the film `gbuffer` of pbrt-v4.
+//! Features of the first surface: the film `gbuffer` of pbrt-v4.
 
 use lumbre_image::Rgb;
 use lumbre_math::{DVec3, Vec2, Vec3};
@@ -12,7 +12,7 @@ use crate::film::pixel::Sums;
 pub struct SurfaceSample {
     /// The point, in the film's space.
     pub point: [f64; 3],
-    /// By how much the third coordinate of the point changes from a pixel to the next one, to the right and downwards.
+    /// The change of the point's third coordinate to the next pixel to the right, and downwards.
     pub slope: [f32; 2],
     /// The geometric normal, unit, in the film's space, on the side of the camera.
     pub normal: [f32; 3],
@@ -24,7 +24,7 @@ pub struct SurfaceSample {
     pub albedo: Rgb,
 }
 
-/// A point of a surface in world space, and what is known of it.
+/// A point of a surface in world space, with its features.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfacePoint {
     pub(crate) point: DVec3,
@@ -35,7 +35,7 @@ pub(crate) struct SurfacePoint {
 }
 
 impl SurfaceSample {
-    /// What a ray from the camera sees of a surface. The rays of its footprint are `spacing` pixels beside it.
+    /// The features at a camera ray's hit. The rays of its footprint are `spacing` pixels away.
     pub(crate) fn of(
         view: &View,
         space: FilmSpace,
@@ -56,7 +56,7 @@ impl SurfaceSample {
             };
             n.normalize_or_zero().as_vec3().to_array()
         };
-        // Where the rays beside it meet the tangent plane.
+        // Where the neighbouring rays meet the tangent plane.
         let beside = |origin: DVec3, direction: DVec3| {
             let t = at.normal.dot(at.point - origin) / at.normal.dot(direction);
             ((point(origin + t * direction) - point(at.point)).z / spacing).abs() as f32
@@ -78,10 +78,11 @@ impl SurfaceSample {
     }
 }
 
-/// Sums over the samples of one pixel, which do not depend on the order that they were added in.
+/// Sums over the samples of one pixel, independent of their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfaceSums {
-    /// Σ weight × value of the samples that see a surface: albedo, point and slope in a unit that the film knows, normal, shading normal, uv.
+    /// Σ weight × value of the samples that see a surface: albedo, point and slope in a unit that the film knows,
+    /// normal, shading normal, uv.
     values: [ExactSum; VALUES],
     /// Σ weight of these samples.
     seen: ExactSum,
@@ -154,8 +155,8 @@ impl SurfaceSums {
         merge(&mut self.squares, &other.squares);
     }
 
-    /// The values of [`Self::CHANNELS`] for a pixel of this many samples: the means over the samples that see a surface, 0 where none does; the
-    /// variance of the colours of all samples; and that, divided by their mean.
+    /// The values of [`Self::CHANNELS`] for a pixel of this many samples: the means over the samples that see a
+    /// surface, 0 where none does; the variance of the colours of all samples; and that, divided by their mean.
     pub fn channels(&self, samples: u32, unit: f64) -> [f32; VALUES + 6] {
         let mut channels = [0.0; VALUES + 6];
         let seen = self.seen.value();

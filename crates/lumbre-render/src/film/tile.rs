@@ -19,7 +19,8 @@ pub struct Exposure {
     pub factor: f32,
     /// The largest component that a sample may have; a brighter one keeps its hue. Infinite to leave all as they are.
     pub max_component: f32,
-    /// What a sensor makes of colours: the rows of a matrix to the red, green and blue of the picture. The identity leaves all as they are.
+    /// What a sensor makes of colours: the rows of a matrix to the red, green and blue of the picture. The identity
+    /// leaves all as they are.
     pub sensor: [[f32; 3]; 3],
 }
 
@@ -90,7 +91,8 @@ impl Default for Sample {
     }
 }
 
-/// The pixels of a rectangle. A clone shares its sums with the original until one of them gets another sample, so that it is cheap.
+/// The pixels of a rectangle. A clone shares its sums with the original until one of them gets another sample, so that
+/// it is cheap.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     bounds: PixelBounds,
@@ -103,12 +105,12 @@ pub struct Tile {
 #[derive(Clone, Debug, PartialEq)]
 struct TileSums {
     pixels: Vec<Pixel>,
-    // Empty unless features are wanted; else as many as pixels.
+    // Empty unless features are wanted; else one per pixel.
     features: Vec<FeatureSums>,
-    // None unless coverage is wanted by colour; else as many as pixels.
+    // None unless coverage is wanted by colour; else one per pixel.
     tints: Sparse<Tint>,
     guides: TileGuides,
-    // Empty unless the film keeps surfaces; else as many as pixels.
+    // Empty unless the film keeps surfaces; else one per pixel.
     surfaces: Vec<SurfaceSums>,
     // Empty unless the film keeps wavelengths; else those of each pixel, one pixel after the other.
     buckets: Vec<BucketSums>,
@@ -119,7 +121,7 @@ struct TileSums {
 struct TileGuides {
     light: Sparse<RatioSums<3>>,
     shadow: Sparse<RatioSums<1>>,
-    // As many as pixels, or none.
+    // One per pixel, or none.
     surfaces: Vec<(GuideSurfaceSums, Count)>,
 }
 
@@ -360,7 +362,7 @@ impl Tile {
         bounds.area().saturating_mul(each as u64)
     }
 
-    /// All sums but those that most tiles lack, to be set.
+    /// The sums that every tile has, to be set.
     pub(crate) fn sums_mut(&mut self) -> TileSumsMut<'_> {
         let TileSums { pixels, features, surfaces, buckets, .. } = Arc::make_mut(&mut self.sums);
         TileSumsMut { pixels, features, surfaces, buckets }
@@ -388,7 +390,7 @@ impl Tile {
         }
     }
 
-    /// The samples of the pixel with the fewest, with those that were dropped.
+    /// The samples of the pixel with the fewest, including dropped ones.
     pub(crate) fn least_taken(&self) -> u32 {
         self.sums.pixels.iter().map(|pixel| pixel.taken).min().unwrap_or(0)
     }
@@ -418,8 +420,8 @@ impl Tile {
         }
     }
 
-    /// Gives every pixel that has no sample the sums of the first pixel of its square of `side` by `side` pixels, counted from
-    /// the tile's corner.
+    /// Gives every pixel that has no sample the sums of the first pixel of its square of `side` by `side` pixels,
+    /// counted from the tile's corner.
     pub fn spread(&mut self, side: u32) {
         let width = self.bounds.width() as usize;
         let side = side.max(1) as usize;
@@ -474,7 +476,7 @@ impl TileSums {
     }
 }
 
-/// The sums of a tile but those that most tiles lack, to be set.
+/// The sums that every tile has, to be set.
 pub(crate) struct TileSumsMut<'a> {
     pub(crate) pixels: &'a mut [Pixel],
     pub(crate) features: &'a mut [FeatureSums],
@@ -482,7 +484,7 @@ pub(crate) struct TileSumsMut<'a> {
     pub(crate) buckets: &'a mut [BucketSums],
 }
 
-/// The sums of a pixel, of which each has this many.
+/// The sums of a pixel, this many for each.
 fn of_pixel<T>(sums: &mut [T], position: usize, each: usize) -> &mut [T] {
     sums.chunks_mut(each.max(1)).nth(position).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! How open each place is.
+//! Ambient occlusion.
 
 use lumbre_math::warp;
 use lumbre_scene::{Interaction, Scene};
@@ -10,14 +10,14 @@ use crate::transport::{Record, SampleNumbers, Sampler};
 use crate::wave::PrimaryHits;
 use crate::wave::trees::{Branch, TreeIntegrator, TreeVertex};
 
-/// The share of the sky over a surface that is open, weighed by the cosine: white where nothing is near.
+/// The cosine-weighted share of the sky that is visible from a surface: white if nothing is near.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmbientOcclusion {
-    /// Whether directions are chosen by the cosine, or uniformly.
+    /// Whether directions are cosine-distributed instead of uniform.
     pub cosine: bool,
-    /// How far to look.
+    /// Maximum distance of occluders.
     pub max_distance: f64,
-    /// About which normal the sky is: the shading normal, or as in pbrt the geometric one.
+    /// The axis of the hemisphere: the shading normal, or the geometric one, as in pbrt.
     pub shading_normals: ShadingNormals,
 }
 

@@ -9,12 +9,13 @@ use crate::transport::{Record, Sampler};
 use crate::wave::PrimaryHits;
 use crate::wave::setting::Setting;
 
-/// [`Path`], and photons for the light that comes from lamps over mirrors and smooth glass to what scatters it: caustics, rooms behind
-/// panes, lamps in bulbs. Paths find such light by chance if the lamp is large, and never if it is a point; photons find it the better the
-/// smaller the lamp. Both are weighed by multiple importance sampling.
+/// [`Path`], and photons for the light that comes from lamps over mirrors and smooth glass to what scatters it:
+/// caustics, rooms behind panes, lamps in bulbs. Paths find such light by chance if the lamp is large, and never if it
+/// is a point; photons find it the better the smaller the lamp. Both are weighed by multiple importance sampling.
 ///
-/// The photons of a few samples of each pixel are one pass, and are collected within a few pixels. That blurs caustics a little, and less
-/// with every pass, so that the mean comes to be right. In a spectral render, all paths of a pass have the same wavelengths. What catches shadows (ground of the studio) collects none.
+/// The photons of a few samples of each pixel are one pass, and are collected within a few pixels. That blurs caustics
+/// a little, and less with every pass, so that the mean comes to be right. In a spectral render, all paths of a pass
+/// have the same wavelengths. What catches shadows (ground of the studio) collects none.
 #[derive(Debug)]
 pub struct Caustics {
     path: Path,

@@ -1,4 +1,4 @@
-//! Pictures of what there is besides light.
+//! Pictures of features.
 
 use lumbre_scene::{Scene, View};
 use lumbre_shading::Spectrum;

@@ -1,4 +1,4 @@
-//! What every integrator does: the radiance along a ray from the camera.
+//! The traits of integrators: radiance along camera rays.
 
 use std::fmt::Debug;
 
@@ -8,12 +8,12 @@ use lumbre_shading::Spectrum;
 use crate::transport::{PrimaryHit, Record, SampleNumbers, Sampler};
 use crate::wave::PrimaryHits;
 
-/// An estimator of the radiance that arrives at the camera, of many samples at a time.
+/// An estimator of the radiance that arrives at the camera, for many samples at a time.
 pub trait Integrator: Debug + Send + Sync {
-    /// Gives each of the samples an estimate of the radiance along its ray from the camera.
+    /// Sets each sample's estimate of the radiance along its camera ray.
     fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, sampler: &Sampler, record: &mut Record);
 
-    /// Whether it takes samples that carry wavelengths in place of linear Rec. 709.
+    /// Whether it supports samples that carry wavelengths instead of linear Rec. 709.
     fn carries_wavelengths(&self) -> bool {
         false
     }
@@ -23,15 +23,15 @@ pub trait Integrator: Debug + Send + Sync {
         false
     }
 
-    /// Whether rays from the camera are to have footprints, also in scenes without textures.
+    /// Whether camera rays need footprints even in scenes without textures.
     fn needs_footprints(&self) -> bool {
         false
     }
 }
 
-/// An estimator that takes one ray from the camera after the other.
+/// An estimator that takes one camera ray at a time.
 pub trait RayIntegrator: Debug + Send + Sync {
-    /// An estimate of the radiance that arrives at the camera along a line of sight.
+    /// An estimate of the radiance along a camera ray.
     fn radiance(
         &self,
         scene: &Scene,

@@ -10,32 +10,32 @@ use crate::wave::PrimaryHits;
 use crate::wave::setting::Setting;
 
 /// Kajiya's path tracing: at each surface one sample of a light and one of the BSDF, combined by the power heuristic,
-/// and Russian roulette by throughput from the sixth bounce on. Many paths go side by side, in waves.
+/// and Russian roulette by throughput from the sixth bounce on. Many paths advance together, in waves.
 ///
-/// Light from points and in one direction, which no path finds by chance, is sampled straight through what does not change
-/// its direction ([`lumbre_shading::Bsdf::straight_on`]): smooth panes without thickness. That is no bounce. What is smooth and refracts
-/// throws a shadow of such light; what is rough is lit by it, and passes it on. The light of surfaces and of the sky is found
-/// by paths, through panes as through anything else.
+/// Light of delta lights, which no path hits by chance, is sampled straight through surfaces that do not change its
+/// direction ([`lumbre_shading::Bsdf::straight_on`]): smooth panes without thickness. That is no bounce. Smooth
+/// refracting surfaces cast a shadow in such light; rough ones scatter it. The light of surfaces and of the sky is
+/// found by paths, through panes as through anything else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Path {
-    /// Bounces at most: 0 shows lights alone, 1 direct light.
+    /// Maximum bounces: 0 shows only lights, 1 direct light.
     pub max_depth: u32,
     /// Whether to roughen surfaces after the first diffuse bounce.
     pub regularize: bool,
-    /// What is made of shading normals that are not those of the surface.
+    /// The treatment of shading normals that differ from the geometric ones.
     pub shading_normals: ShadingNormals,
-    /// How light is found.
+    /// The sampling strategies for light.
     pub strategy: Strategy,
-    /// Bounces that every path may take before Russian roulette.
+    /// Minimum bounces before Russian roulette.
     pub roulette_start: u32,
 }
 
-/// Bounces that every path may take before Russian roulette: fewer cost more error than they save time, in every scene that was
-/// measured.
+/// Default minimum of bounces before Russian roulette: fewer cost more error than they save time, in every measured
+/// scene.
 const ROULETTE_START: u32 = 5;
 
 impl Path {
-    /// A path tracer with this many bounces at most.
+    /// A path tracer with this maximum of bounces.
     pub fn new(max_depth: u32) -> Self {
         Self {
             max_depth,
@@ -48,7 +48,7 @@ impl Path {
 }
 
 impl Path {
-    /// What all paths have in common.
+    /// The data shared by all paths.
     pub(crate) fn setting<'s>(&self, scene: &'s Scene, sampler: &Sampler) -> Setting<'s> {
         Setting {
             scene,

@@ -1,4 +1,5 @@
-//! POV-Ray's local illumination: ambient, diffuse and highlights of each layer, mirrors, refraction, filtered shadows and fog.
+//! POV-Ray's local illumination: ambient, diffuse and highlights of each layer, mirrors, refraction, filtered shadows
+//! and fog.
 
 mod media;
 
@@ -15,8 +16,8 @@ use smallvec::SmallVec;
 use crate::integrators::RayIntegrator;
 use crate::transport::{PrimaryHit, Record, SampleNumbers};
 
-/// The light of POV-Ray's scenes as POV-Ray computes it, after its reference manual. Colours are in the scene's working space
-/// until they are summed.
+/// The light of POV-Ray's scenes as POV-Ray computes it, after its reference manual. Colours are in the scene's working
+/// space until they are summed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pov;
 

@@ -16,27 +16,27 @@ use crate::wave::trees::{Branch, TreeIntegrator, TreeVertex, rounded};
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///
 /// Whitted, "An Improved Illumination Model for Shaded Display", CACM 23(6), 1980. A mixture counts with all of its
-/// materials at once. Where a classic ray tracer gives up a branch that carries too little to be seen, it goes on here as
-/// often as it carries light, so that the picture is right in the mean. Direct light goes straight on through smooth panes
-/// without thickness; what is rough, or bends it, throws a shadow.
+/// materials at once. A branch that carries too little light to be visible ends by Russian roulette, so that the
+/// picture is unbiased. Direct light passes straight through smooth panes without thickness; rough or refracting
+/// surfaces cast a shadow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Whitted {
-    /// Reflections and refractions one after the other at most, and the direct light of the last surface.
+    /// Maximum number of successive reflections and refractions.
     pub max_depth: u32,
-    /// Points on each light that has a surface, at least 1: those of all samples of a pixel are even together.
+    /// Points on each area light, at least 1; the points of all samples of a pixel are stratified together.
     pub light_samples: u32,
     /// Whether lights at infinity light surfaces. Without it they are background: mirrors and escaping rays show them.
     pub sky: bool,
-    /// What is made of shading normals that are not those of the surface.
+    /// The treatment of shading normals that differ from the geometric ones.
     pub shading_normals: ShadingNormals,
 }
 
-/// With more lights than these, one is chosen by its power.
+/// With more lights than this, one is chosen by power.
 const EVERY_LIGHT_UP_TO: usize = 64;
-/// A branch that carries less than this goes on as often as it carries this.
+/// A branch that carries less than this plays Russian roulette.
 const FAINT: f32 = 1.0 / 255.0;
 
-/// The materials at a place that scatter, with their shares.
+/// The scattering materials at a point, with their shares.
 type Scatterers<'a, 's> = SmallVec<[(f32, Vertex<'a, 's>); 2]>;
 
 impl Whitted {
@@ -45,7 +45,7 @@ impl Whitted {
         Self { max_depth, light_samples: 1, sky: false, shading_normals: ShadingNormals::default() }
     }
 
-    /// The materials that scatter at a vertex. Adds the rays of its mirrors and its glass to the tree.
+    /// The scattering materials at a vertex. Adds the rays of its mirrors and its glass to the tree.
     fn split<'a, 's>(
         &self,
         scene: &'s Scene,
@@ -175,7 +175,8 @@ fn add_light<'s>(
     let sample = to.reachable(sample);
     let mut sum = Spectrum::BLACK;
     let mut shadow_ray = None;
-    // Through panes light goes straight on, which is known at once; else a shadow ray tells.
+    // Through panes light goes straight on, of any light, since nothing else finds light behind a pane. That is known at
+    // once; otherwise a shadow ray tells.
     let goes_straight_on = scene.has_delta_transmission();
     for (share, vertex) in scatterers {
         let scattered = vertex.eval(sample.towards) * *share;

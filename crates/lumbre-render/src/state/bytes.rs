@@ -1,8 +1,8 @@
 //! The state of a render as bytes.
 //!
-//! Numbers are little-endian. After a head come strips of [`STRIP`] rows, so that neither writing nor reading needs all bytes in memory. A
-//! strip has planes: one number of every pixel, row by row, each as the lowest `n` bytes of its two's complement, where `n`, the first byte
-//! of the plane, is as small as all of them allow.
+//! Numbers are little-endian. After a head come strips of [`STRIP`] rows, so that neither writing nor reading needs all
+//! bytes in memory. A strip has planes: one number of every pixel, row by row, each as the lowest `n` bytes of its
+//! two's complement, where `n`, the first byte of the plane, is as small as all of them allow.
 
 use std::io::{self, Read, Write};
 
@@ -15,7 +15,7 @@ use crate::film::{
 use crate::state::{Piece, REMEMBERED, RenderState};
 use crate::{DroppedSample, PixelBounds, RayCounts};
 
-/// What is wrong with the bytes of a state.
+/// An error in the bytes of a state.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StateError {
@@ -25,7 +25,7 @@ pub enum StateError {
     /// They end too early.
     #[error("it ends too early")]
     Truncated,
-    /// Its numbers make no state.
+    /// The numbers are not those of a state.
     #[error("its {0} make no sense")]
     Invalid(&'static str),
     /// It would take more memory than is allowed.
@@ -42,17 +42,17 @@ impl From<io::Error> for StateError {
     }
 }
 
-/// Pieces at most.
+/// Maximum number of pieces.
 const MAX_PIECES: u32 = 1 << 20;
 /// Rows of a strip.
 const STRIP: u32 = 16;
 
 impl RenderState {
-    /// Writes the state as bytes: the same for the same state, whatever it was merged of. Sums are dropped as they are written, unless others
-    /// share them.
+    /// Writes the state as bytes: the same for the same state, however it was merged. Sums are freed as they are
+    /// written, unless they are shared.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// The errors of `out`.
     pub fn write_to(mut self, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(&self.head())?;
         let (bounds, extras) = (self.bounds, self.extras());
@@ -183,7 +183,7 @@ impl RenderState {
     }
 }
 
-/// What stands in the head where there are no buckets.
+/// The number of buckets in the head if there are none.
 const NO_BUCKETS: Buckets = Buckets { count: 0, low: 0.0, high: 0.0 };
 
 /// The strips of a picture, from above.
@@ -242,7 +242,7 @@ fn surface_of(numbers: [i128; NUMBERS]) -> SurfaceSums {
     own
 }
 
-/// Writes a plane for each number of the sums, each put together in `bytes`.
+/// Writes a plane for each number of the sums, with `bytes` as a buffer.
 fn planes<T, const N: usize>(
     out: &mut dyn Write,
     bytes: &mut Vec<u8>,
@@ -252,7 +252,7 @@ fn planes<T, const N: usize>(
     if sums.is_empty() {
         return Ok(());
     }
-    // Of each plane, the bits that differ from the sign in any number, and whether any is other than 0.
+    // For each plane, the bits that differ from the sign in any number, and whether any number is not 0.
     let mut bits = [0_i128; N];
     let mut is_used = [false; N];
     let all: Vec<[i128; N]> = sums.iter().map(numbers).collect();
@@ -267,7 +267,7 @@ fn planes<T, const N: usize>(
         bytes.clear();
         bytes.push(width as u8);
         let end = 1 + width * sums.len();
-        // Each is written whole, as that is faster, and the next one takes the place of what is too much of it.
+        // Each number is written whole, which is faster; the next one overwrites the excess bytes.
         bytes.resize(end + 16, 0);
         for (k, numbers) in all.iter().enumerate() {
             let at = 1 + width * k;
@@ -278,7 +278,7 @@ fn planes<T, const N: usize>(
     Ok(())
 }
 
-/// What is left to read.
+/// The rest of the input.
 struct Input<'a>(&'a mut dyn Read);
 
 impl Input<'_> {

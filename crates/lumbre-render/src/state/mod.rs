@@ -1,4 +1,4 @@
-//! What a render has gathered so far: to go on from, and to join with what others gathered.
+//! The state of a render, to resume from and to merge.
 
 mod bytes;
 
@@ -16,19 +16,19 @@ use crate::{DroppedSample, PixelBounds, RayCounts, Rendered, Stats};
 
 pub use bytes::StateError;
 
-/// The sums of every pixel of a render, finished or not, and which samples they are of.
+/// The sums of every pixel of a render, finished or not, and the samples that they contain.
 ///
-/// Sums are exact ([`crate::film::ExactSum`]). So the states of parts of a render, by ranges of samples and by crops, come to the
-/// state of the whole, bit for bit, in whatever order and grouping they are merged.
+/// Sums are exact ([`crate::film::ExactSum`]). So the states of parts of a render, by ranges of samples and by crops,
+/// merge to the state of the whole, bit for bit, in any order and grouping.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderState {
     /// The rectangle that holds all pieces.
     pub(crate) bounds: PixelBounds,
     /// The sums of all its pixels: in one tile, or in many without overlaps.
     pub(crate) tiles: Vec<Tile>,
-    /// What was asked for.
+    /// The requested samples.
     pub(crate) pieces: Vec<Piece>,
-    /// What it took.
+    /// Rays traced.
     pub(crate) rays: RayCounts,
     /// Samples that were not finite.
     pub(crate) dropped: u64,
@@ -62,7 +62,7 @@ pub enum MergeError {
     Guides,
 }
 
-/// Dropped samples that are remembered by place.
+/// Maximum dropped samples whose pixels are remembered.
 pub(crate) const REMEMBERED: usize = 16;
 
 impl fmt::Display for Piece {
@@ -73,12 +73,12 @@ impl fmt::Display for Piece {
 }
 
 impl Piece {
-    /// How many samples.
+    /// Number of samples.
     pub fn count(&self) -> u64 {
         self.bounds.area() * u64::from(self.samples.end.saturating_sub(self.samples.start))
     }
 
-    /// What both have.
+    /// The intersection.
     pub fn intersection(&self, other: &Self) -> Option<Self> {
         let bounds = self.bounds.intersection(&other.bounds);
         let samples = self.samples.start.max(other.samples.start)..self.samples.end.min(other.samples.end);
@@ -96,7 +96,7 @@ impl RenderState {
         self.tiles.iter().flat_map(Tile::pixels)
     }
 
-    /// What is gathered besides colours.
+    /// Sums besides colours.
     pub(crate) fn extras(&self) -> Extras {
         self.tiles.first().map(Tile::extras).unwrap_or_default()
     }
@@ -113,17 +113,17 @@ impl RenderState {
         }
     }
 
-    /// Which samples of which pixels it is to have, without overlaps, in the order that they were merged in.
+    /// The requested samples and pixels, without overlaps, in the order of merging.
     pub fn pieces(&self) -> &[Piece] {
         &self.pieces
     }
 
-    /// How many of these samples were taken.
+    /// Number of these samples that were taken.
     pub fn taken(&self) -> u64 {
         self.pixels().map(|pixel| u64::from(pixel.taken)).sum()
     }
 
-    /// How many samples it is to have.
+    /// Number of requested samples.
     pub fn wanted(&self) -> u64 {
         self.pieces.iter().map(Piece::count).sum()
     }
@@ -133,14 +133,14 @@ impl RenderState {
         self.taken() == self.wanted()
     }
 
-    /// The samples that the pixel with the fewest has.
+    /// The fewest samples of any pixel.
     pub fn least_samples(&self) -> u32 {
         let covered: u64 = self.tiles.iter().map(|tile| tile.bounds().area()).sum();
         let is_whole = covered == self.bounds.area();
         self.pixels().map(|pixel| pixel.taken).min().filter(|_| is_whole).unwrap_or(0)
     }
 
-    /// The samples that the pixel with the most has.
+    /// The most samples of any pixel.
     pub fn most_samples(&self) -> u32 {
         self.pixels().map(|pixel| pixel.taken).max().unwrap_or(0)
     }
@@ -152,9 +152,9 @@ impl RenderState {
         first..last
     }
 
-    /// What is missing of the samples 0 to the last of any, for the pixels of `bounds`, each piece as large as it can be.
+    /// The gaps in samples 0 to the last of any, for the pixels of `bounds`, in pieces as large as possible.
     pub fn gaps(&self, bounds: PixelBounds) -> Vec<Piece> {
-        // Pieces are few: what is left of one gap after another.
+        // Pieces are few, so gaps are split one after another.
         let mut gaps = vec![Piece { bounds, samples: 0..self.samples().end }];
         for piece in &self.pieces {
             gaps = gaps.iter().flat_map(|gap| without(gap, piece)).collect();
@@ -162,7 +162,7 @@ impl RenderState {
         gaps
     }
 
-    /// The picture that it is, with coverage if it is to be transparent. Its statistics are those of the samples.
+    /// The picture, with alpha if it is transparent. The statistics are those of the samples.
     pub fn to_rendered(&self, transparent: bool) -> Rendered {
         // All in one, so that sums of rounded numbers, such as the noise, do not depend on the order of merges.
         let film = self.film();
@@ -182,13 +182,13 @@ impl RenderState {
         Rendered { stats, ..rendered }
     }
 
-    /// The variance of the luminance of every pixel, in all three channels, as it is estimated from its samples: that of their mean, so
-    /// that it falls with their number. 0 for fewer than two samples.
+    /// The variance of the mean luminance of every pixel, in all three channels, estimated from its samples; it falls
+    /// with their number. 0 for fewer than two samples.
     pub fn variance(&self) -> Image {
         variance_picture(self.tiles.iter(), self.bounds)
     }
 
-    /// Adds what another gathered.
+    /// Adds another state.
     ///
     /// # Errors
     /// [`MergeError`]; nothing is changed then.
@@ -205,7 +205,7 @@ impl RenderState {
             return Err(MergeError::Guides);
         }
         if self.tiles.len() > 1 && other.tiles.len() > 1 {
-            // Each of many would be looked for among many.
+            // Looking up each of many tiles among many would be quadratic.
             self.tiles = vec![self.film().into_owned()];
         }
         self.bounds = self.bounds.hull(&other.bounds);
@@ -220,8 +220,8 @@ impl RenderState {
         Ok(())
     }
 
-    /// Adds the sums of a tile within the bounds, in a time that does not depend on how large the picture is, but for tiles that lie
-    /// across others.
+    /// Adds the sums of a tile within the bounds, in a time that does not depend on the size of the picture, unless the
+    /// tile overlaps others.
     fn add(&mut self, tile: &Tile) {
         let bounds = tile.bounds();
         if let Some(own) = self.tiles.iter_mut().find(|own| own.bounds().intersection(&bounds) == bounds) {
@@ -237,7 +237,7 @@ impl RenderState {
     }
 }
 
-/// What is left of a piece without another: up to six pieces.
+/// The difference of two pieces: up to six pieces.
 fn without(piece: &Piece, other: &Piece) -> Vec<Piece> {
     let Some(both) = piece.intersection(other) else { return vec![piece.clone()] };
     let PixelBounds { x0, y0, x1, y1 } = piece.bounds;

@@ -21,10 +21,10 @@ use crate::transport::through::straight_on;
 /// Transport Simulation and Rendering System", 2017, A.3.
 ///
 /// If the faces of a mesh approximate a smooth surface that bulges out over them, directions below a face but above
-/// that surface are valid: they stay as they are, and their rays start on it ([`Interaction::unoccluded_terminator_origin`]). So shadows end
-/// where the smooth surface turns away from the light, not at the edge of a face. J. Hanika ("Hacking the Shadow
-/// Terminator", 2021) starts all rays there. Here only rays below the face do, so that objects on the surface do not
-/// seem to hover.
+/// that surface are valid: they stay as they are, and their rays start on it
+/// ([`Interaction::unoccluded_terminator_origin`]). So shadows end where the smooth surface turns away from the light,
+/// not at the edge of a face. J. Hanika ("Hacking the Shadow Terminator", 2021) starts all rays there. Here only rays
+/// below the face do, so that objects on the surface do not seem to hover.
 ///
 /// [`ShadingNormals::Pbrt`] turns all of this off.
 pub(crate) struct Vertex<'a, 's> {

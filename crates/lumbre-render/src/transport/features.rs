@@ -1,4 +1,4 @@
-//! What a picture can show other than light: reflectance, normals, depth and surface parameters.
+//! Features, which are written as AOVs: reflectance, normals, depth and surface parameters.
 
 use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{Vec2, Vec3};
@@ -7,7 +7,7 @@ use lumbre_shading::Spectrum;
 
 use crate::transport::PrimaryHit;
 
-/// One of the features.
+/// A feature of the first hit: an AOV.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Feature {
@@ -22,17 +22,14 @@ pub enum Feature {
 }
 
 impl Feature {
-    /// Every feature.
+    /// Every feature, in the order of the enum.
     pub const ALL: [Self; 4] = [Self::Albedo, Self::Normal, Self::Depth, Self::Uv];
+    /// Their names, in the same order: those of layers in files and of the command line.
+    pub const NAMES: [&'static str; 4] = ["albedo", "normal", "depth", "uv"];
 
-    /// Its name in file layers and on the command line.
+    /// Its name, one of [`Self::NAMES`].
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Albedo => "albedo",
-            Self::Normal => "normal",
-            Self::Depth => "depth",
-            Self::Uv => "uv",
-        }
+        Self::NAMES[self as usize]
     }
 
     /// The names of its channels in file layers, after its own: `albedo.R`.

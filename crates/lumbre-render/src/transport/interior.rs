@@ -6,7 +6,7 @@ use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
 use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use smallvec::SmallVec;
 
-/// The solids around a point of a path, the innermost last: those that were entered and not left yet.
+/// The solids around a point of a path, the innermost last: entered and not yet left.
 ///
 /// Solids are identified by their materials, so that one made of several meshes may be entered by one and left by
 /// another. Only the innermost medium applies. At its surface, its index of refraction is relative to that of the solid

@@ -72,8 +72,10 @@ pub(crate) struct Wave<'s> {
     hits: Hits,
     flat: FlatHits,
     smooth: SmoothHits,
-    /// Paths that left the scene or met something other than a triangle in columns.
-    others: Vec<u32>,
+    /// Paths that left the scene.
+    escaped: Vec<u32>,
+    /// Paths whose vertices are made one by one: their hit is no top-level triangle, or needs more than lanes do.
+    not_in_lanes: Vec<u32>,
     vertices: Vertices<'s>,
     found: Vec<Found>,
     shadows: Shadows<'s>,
@@ -81,9 +83,10 @@ pub(crate) struct Wave<'s> {
     crossings: Vec<u32>,
     /// Paths that scattered inside solids before they reached a surface.
     collided: Vec<OnePath>,
-    /// Collisions in media between surfaces. In a scene with such media, also which paths do not reach what they meet.
+    /// Collisions in media between surfaces.
     collisions: Vec<Collision>,
-    taken: Vec<bool>,
+    /// Whether each path scatters or ends in a medium before its hit; empty without media.
+    stopped_in_medium: Vec<bool>,
     /// The boundaries of media along one ray.
     boundaries: Vec<Crossing>,
     merges: Merges,
@@ -229,7 +232,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Adds the light of unoccluded light samples.
+    /// Traces the shadow rays of all light samples, and adds the light of those that are unoccluded.
     fn trace_shadows(
         &mut self,
         setting: &Setting<'s>,
@@ -247,7 +250,7 @@ impl<'s> Wave<'s> {
         }
     }
 
-    /// Ends the paths whose rays are blocked before the smooth surface that they start on.
+    /// Ends the paths with something between their face and the smooth surface that their ray starts on.
     fn test_terminator_segments(&mut self, scene: &Scene, record: &mut Record) {
         let mut ended = Vec::new();
         for &TerminatorSegment { ray, from } in &self.terminator_segments {

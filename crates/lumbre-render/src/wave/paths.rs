@@ -31,8 +31,8 @@ pub(crate) fn of_column(medium: u32) -> Option<MediumId> {
     (medium != VACUUM).then_some(MediumId(medium))
 }
 
-/// The media on both sides of a surface, as columns store them: where the path comes from and behind. `around` is the
-/// medium before.
+/// The media on both sides of a surface, as columns store them: first the side that the path comes from, then the far
+/// side. `around` is the medium of both if the surface is no boundary.
 pub(crate) fn sides(boundary: Option<Boundary>, front: bool, around: u32) -> [u32; 2] {
     match boundary {
         None => [around; 2],
@@ -172,7 +172,8 @@ pub(crate) struct Paths {
     pub(crate) slot: Vec<u32>,
     /// The origin of the ray, from which lights were sampled too.
     pub(crate) origin: [Vec<f64>; 3],
-    /// The normal at the origin for which lights were sampled: see [`lumbre_scene::light::lanes::Receiver`].
+    /// The normal at the origin for which lights were sampled, zero if they were sampled for every direction: see
+    /// [`lumbre_scene::light::lanes::Receiver`].
     pub(crate) receiver_normal: [Vec<f32>; 3],
     /// Unit.
     pub(crate) direction: [Vec<f32>; 3],
@@ -182,8 +183,8 @@ pub(crate) struct Paths {
     /// The density of the chosen direction; infinite if it was the only one.
     pub(crate) pdf: Vec<f32>,
     /// For light found behind specular surfaces: the density of the direction before them, divided by the number of
-    /// lines of a pass and by the area (in a medium: volume, per length) in which photons are collected there. Infinite
-    /// if photons do not find that light.
+    /// light paths of a pass and by the area (in a medium: volume, per length) in which photons are collected there.
+    /// Infinite if photons do not find that light.
     pub(crate) merge_pdf: Vec<f32>,
     /// Bounces off surfaces, and [`SCATTERED`].
     pub(crate) depth: Vec<u32>,

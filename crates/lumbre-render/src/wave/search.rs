@@ -15,7 +15,7 @@ pub(crate) struct Hits {
     /// Hits in double precision; used unless `is_single` says otherwise.
     double: Vec<Option<Hit>>,
     is_single: bool,
-    /// The index in the columns of each ray's hit; empty if that is the ray's own index.
+    /// The index in the columns of each ray's hit; empty if the hit of ray i is in column i.
     kept: Vec<u32>,
     /// The hits behind what rays pass through, by ascending index in the columns.
     behind: Vec<(u32, Option<Hit>)>,

@@ -32,12 +32,12 @@ pub(crate) struct Setting<'s> {
     pub(crate) merging: Option<Merging<'s>>,
 }
 
-/// The first leg of a ray: from a face to the smooth surface over it, where the ray itself starts.
+/// The segment from a face to the smooth surface over it, on which a ray starts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TerminatorSegment {
     /// The index of the ray.
     pub(crate) ray: u32,
-    /// The origin of the leg.
+    /// The origin of the segment.
     pub(crate) from: DVec3,
 }
 

@@ -35,7 +35,7 @@ pub(crate) struct Shade<'a, 's> {
     pub(crate) queue: &'a [u32],
     pub(crate) count: usize,
     pub(crate) next: &'a mut Paths,
-    /// First legs of the rays of `next`.
+    /// Segments from the faces to the origins of rays of `next`, for rays that start on a smooth surface.
     pub(crate) terminator_segments: &'a mut Vec<TerminatorSegment>,
     pub(crate) shadows: &'a mut Shadows<'s>,
     /// Vertices whose paths cross the surface, in scenes with solids or media.
@@ -73,8 +73,8 @@ impl<K: Kind> Job for ShadeKind<'_, '_, '_, K> {
 /// If the faces of a mesh approximate a smooth surface that bulges out over them, directions below a face but above
 /// that surface stay as they are, and their rays start on it. So shadows end where the smooth surface turns away from
 /// the light, not at the edge of a face. J. Hanika ("Hacking the Shadow Terminator", 2021) starts all rays there; here
-/// only rays below the face do. Objects between the face and the smooth surface block such rays: that is their first
-/// leg.
+/// only rays below the face do. An object between the face and the smooth surface blocks such a ray; this
+/// stretch, the terminator segment, is tested separately.
 #[derive(Clone, Copy)]
 pub(super) struct Vertex<R: Real> {
     place: Place<R>,
@@ -86,9 +86,11 @@ pub(super) struct Vertex<R: Real> {
     n: V3<R>,
     /// To the viewer, in the frame.
     wo: V3<R>,
+    /// [`FOLDS`], [`SIDED`] and [`HAS_TERMINATOR_OFFSET`].
     folds: R::Mask,
     sided: R::Mask,
     has_terminator_offset: R::Mask,
+    /// See [`Vertices::smooth_normal`].
     smooth_normal: V3<R>,
     terminator_origin: V3<R::Double>,
 }
@@ -412,10 +414,7 @@ impl<'s> Shade<'_, 's> {
         let scattered = R::UInt::gather(&self.paths.depth, at) & R::UInt::splat(SCATTERED);
         let scattered = R::UInt::select(sample.delta, scattered, R::UInt::splat(SCATTERED));
         let (origin, stays) = vertex.start(direction);
-        let (mut receiver_normal, mut merge_pdf) = (vertex.receiver_normal, R::splat(f32::INFINITY));
-        if self.setting.merging.is_some() {
-            (receiver_normal, merge_pdf) = self.merge_pdf(arrived, sample.delta, pdf);
-        }
+        let (receiver_normal, merge_pdf) = self.receiver_and_merge_pdf(arrived, sample.delta, pdf);
         let path = Departure {
             slot: arrived.slot,
             origin,
@@ -449,11 +448,13 @@ impl<'s> Shade<'_, 's> {
 }
 
 impl Shade<'_, '_> {
-    /// What a path keeps to weigh light that it finds against photons: the receiver of that light, and
-    /// [`Paths::merging`]. Photons start at specular surfaces with light from every side.
+    /// [`Paths::receiver_normal`] and [`Paths::merge_pdf`] of the next ray. Photons reach specular surfaces from every
+    /// side, so after one of these the receiver has no normal.
     #[inline(always)]
-    fn merge_pdf<R: Real>(&self, arrived: &Arrived<R>, delta: R::Mask, pdf: R) -> (V3<R>, R) {
-        let Some(merging) = &self.setting.merging else { return (arrived.vertex.receiver_normal, pdf) };
+    fn receiver_and_merge_pdf<R: Real>(&self, arrived: &Arrived<R>, delta: R::Mask, pdf: R) -> (V3<R>, R) {
+        let Some(merging) = &self.setting.merging else {
+            return (arrived.vertex.receiver_normal, R::splat(f32::INFINITY));
+        };
         let flags = R::UInt::gather(&self.paths.depth, arrived.at) & R::UInt::splat(SCATTERED);
         let has_scattered = !flags.simd_eq(R::UInt::splat(0));
         let width = R::gather(&self.vertices.width, arrived.vertex_at);
@@ -464,10 +465,11 @@ impl Shade<'_, '_> {
     }
 }
 
-/// Records the first legs of rays for the lanes of `some`; those of `all` were appended from `first` on.
+/// Records the terminator segments of rays for the lanes of `some`; the rays of the lanes `all` were appended from
+/// index `first` on.
 #[inline(always)]
 fn push_terminator_segments<R: Real>(
-    terminator_segments: &mut Vec<TerminatorSegment>,
+    segments: &mut Vec<TerminatorSegment>,
     first: usize,
     all: R::Mask,
     some: R::Mask,
@@ -480,7 +482,7 @@ fn push_terminator_segments<R: Real>(
         some &= some - 1;
         let before = (all & ((1 << lane) - 1)).count_ones();
         let from = DVec3::new(from[0][lane], from[1][lane], from[2][lane]);
-        terminator_segments.push(TerminatorSegment { ray: first as u32 + before, from });
+        segments.push(TerminatorSegment { ray: first as u32 + before, from });
     }
 }
 

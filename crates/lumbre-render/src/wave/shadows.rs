@@ -21,18 +21,18 @@ pub(crate) struct Shadows<'s> {
     pub(crate) origin: [Vec<f64>; 3],
     /// To the light, or, where [`Shadows::end`] is infinite, the unit direction of one that is infinitely far away.
     pub(crate) to_light: [Vec<f64>; 3],
-    /// The end of a segment along its way.
+    /// The end of a segment, as a factor of [`Shadows::to_light`].
     pub(crate) end: Vec<f64>,
     /// What the path receives if the segment is unoccluded.
     pub(crate) contribution: [Vec<f32>; 3],
     /// The medium at the start of a segment, as [`of_column`] reads it; empty in a scene without media.
     pub(crate) medium: Vec<u32>,
-    /// First legs of segments.
+    /// What must be unoccluded, too, for segments that start on a smooth surface over a face.
     pub(crate) terminator_segments: Vec<TerminatorSegment>,
     /// Segments that pass through panes.
     pub(crate) panes: Vec<Pane<'s>>,
     rays: Vec<Ray>,
-    /// The way and the end, rounded for rays in single precision.
+    /// The direction and the end, rounded for rays in single precision.
     direction: [Vec<f32>; 3],
     t_max: Vec<f32>,
     times: Vec<f64>,
@@ -70,7 +70,7 @@ pub(crate) struct OneSegment {
     pub(crate) medium: u32,
 }
 
-/// The fraction of the way to a point that a segment covers: allows for rounding of its direction and of `t`.
+/// The fraction of the distance to a point that a segment covers: allows for rounding of its direction and of `t`.
 pub(crate) const NEARLY_WHOLE: f64 = 1.0 - 1.0 / (1_u64 << 40) as f64;
 
 impl<'s> Shadows<'s> {

@@ -34,6 +34,7 @@ impl<'s> Wave<'s> {
         self.smooth.reset(self.paths.len);
         self.found.clear();
         self.collided.clear();
+        // Regularization depends on the path so far, which BSDF rows of the scene do not.
         let takes_triangles = !setting.regularize;
         let mut not_in_lanes = std::mem::take(&mut self.not_in_lanes);
         not_in_lanes.clear();
@@ -185,6 +186,7 @@ impl<'s> Wave<'s> {
         }
     }
 
+    /// Makes the vertex of one path and queues it, after the medium before it and its emission.
     fn make_vertex(
         &mut self,
         setting: &Setting<'s>,
@@ -211,7 +213,7 @@ impl<'s> Wave<'s> {
             if self.reflect_inside(path, slot, ray, here, body, record) {
                 return;
             }
-            // The path below the surface does not count.
+            // Bounces below the surface do not count towards the depth.
             depth = depth.saturating_sub(1);
             self.paths.depth[path] = depth | SCATTERED;
         }
@@ -255,10 +257,10 @@ impl<'s> Wave<'s> {
         if flags & FOLDS != 0
             && let Some(terminator_origin) = here.terminator_origin()
         {
-            let (smooth, geometric) = (here.shading.normal, here.shading.geometric);
-            let on_its_side = if here.front { geometric } else { -geometric };
-            let smooth = if smooth.dot(on_its_side) < 0.0 { -smooth } else { smooth };
-            self.vertices.put_terminator_origin(smooth, terminator_origin);
+            let (normal, geometric) = (here.shading.normal, here.shading.geometric);
+            let facing = if here.front { geometric } else { -geometric };
+            let smooth_normal = if normal.dot(facing) < 0.0 { -normal } else { normal };
+            self.vertices.put_terminator_origin(smooth_normal, terminator_origin);
             flags |= LIT_FROM_BELOW;
         }
         if material.is_solid() {

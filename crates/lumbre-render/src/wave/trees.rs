@@ -121,9 +121,9 @@ impl<'s> TreeVertex<'_, 's> {
         self.shadows.push_one(&OneSegment {
             slot: self.direct.slot,
             origin: ray.origin,
-            way: ray.direction,
+            to_light: ray.direction,
             end: ray.t_max,
-            light,
+            contribution: light,
             medium: to_column(None),
         });
         segment as u32
@@ -245,7 +245,7 @@ impl<'s> Wave<'s> {
             let mut light = unoccluded;
             for segment in begin..end {
                 if !self.shadows.blocked[segment] {
-                    light += self.shadows.light(segment);
+                    light += self.shadows.contribution(segment);
                 }
             }
             begin = end;

@@ -24,8 +24,8 @@ pub(crate) struct Vertices<'s> {
     pub(crate) frame_n: [Vec<f32>; 3],
     /// A combination of [`FOLDS`], [`SIDED`], [`HAS_TERMINATOR_OFFSET`] and [`LIT_FROM_BELOW`].
     pub(crate) flags: Vec<u32>,
-    /// Only with [`HAS_TERMINATOR_OFFSET`]: the shading normal before bump maps, on the side of the viewer, and the origin of rays that
-    /// leave below the face but above the smooth surface.
+    /// Only with [`HAS_TERMINATOR_OFFSET`]: the shading normal before bump maps, on the side of the viewer, and the
+    /// origin of rays that leave below the face but above the smooth surface.
     pub(crate) smooth_normal: [Vec<f32>; 3],
     pub(crate) terminator_origin: [Vec<f64>; 3],
     /// Start of the BSDF's row in [`Vertices::rows`].
@@ -49,7 +49,7 @@ pub(crate) struct Vertices<'s> {
 pub(crate) const FOLDS: u32 = 1;
 /// The shading normal is not the geometric one, which only decides the side of a direction, as in pbrt.
 pub(crate) const SIDED: u32 = 2;
-/// The mesh approximates a smooth surface above the face.
+/// The mesh approximates a smooth surface above the face: [`lumbre_scene::Interaction::terminator_origin`].
 pub(crate) const HAS_TERMINATOR_OFFSET: u32 = 4;
 
 /// Light from below the horizon counts: the surface transmits, or approximates a smooth one.

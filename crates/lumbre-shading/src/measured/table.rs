@@ -29,7 +29,8 @@ fn place(nodes: &[f32], value: f64) -> (usize, f64) {
     (below, ((value - low) / (high - low)).clamp(0.0, 1.0))
 }
 
-/// Numbers on a grid over the unit square, bilinear between its nodes, for each slice; slices lie one after the other, each row by row.
+/// Numbers on a grid over the unit square, bilinear between its nodes, for each slice; slices lie one after the other,
+/// each row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Table {
     width: usize,
@@ -96,17 +97,19 @@ impl Table {
     }
 }
 
-/// A density over the unit square for each slice, and the warp that samples it: first a row by the density of rows, then a place in the
-/// row. Both densities are piecewise linear, so that their integrals are inverted by the roots of quadratics.
+/// A density over the unit square for each slice, and the warp that samples it: first a row by the density of rows,
+/// then a place in the row. Both densities are piecewise linear, so that their integrals are inverted by the roots of
+/// quadratics.
 ///
-/// Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering", SIGGRAPH Asia 2018.
+/// Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering", SIGGRAPH
+/// Asia 2018.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Warp {
     /// The density: the integral of each slice is 1.
     density: Table,
     /// For each node, the integral over its row up to it.
     along: Table,
-    /// For each row, the integral up to it; as wide as two nodes of which the second is not read.
+    /// For each row, the integral up to it; as wide as two nodes; the second is not read.
     up: Vec<f32>,
 }
 

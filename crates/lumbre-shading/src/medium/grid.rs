@@ -11,8 +11,8 @@ pub trait Voxel: Copy + Default + Add<Output = Self> + Mul<f32, Output = Self> {
 impl Voxel for f32 {}
 impl Voxel for Spectrum {}
 
-/// Values at the centres of voxels that fill the unit cube, interpolated linearly; 0 beyond them, so that a grid of one value falls to
-/// half of it on each face.
+/// Values at the centres of voxels that fill the unit cube, interpolated linearly; 0 beyond them, so that a grid of one
+/// value falls to half of it on each face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid<V> {
     size: [usize; 3],
@@ -20,7 +20,7 @@ pub struct Grid<V> {
     values: Vec<V>,
 }
 
-/// There are not as many values as voxels, or there is no voxel.
+/// The numbers of values and voxels differ, or there is no voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{} values for {} × {} × {} voxels", .values, .size[0], .size[1], .size[2])]
 pub struct GridError {

@@ -1,10 +1,11 @@
 //! Media that differ from place to place.
 //!
-//! A majorant is a bound on the extinction in a part of the medium, for all channels. Tentative collisions are as frequent as if it were
-//! the extinction; each is then taken as a real one, or as one with nothing, by chance: E. Woodcock and others, "Techniques Used in the
-//! GEM Code for Monte Carlo Neutronics Calculations", 1965. Probabilities come from what the light carries in all channels, which are
-//! weighed by what is true of them, so that coloured media have no channel that seldom counts for much: P. Kutz and others, "Spectral
-//! and Decomposition Tracking for Rendering Heterogeneous Volumes", ACM Transactions on Graphics 36, 2017.
+//! A majorant is a bound on the extinction in a part of the medium, for all channels. Tentative collisions are as
+//! frequent as if it were the extinction; each is then taken as a real one, or as one with nothing, by chance: E.
+//! Woodcock and others, "Techniques Used in the GEM Code for Monte Carlo Neutronics Calculations", 1965. Probabilities
+//! come from what the light carries in all channels, which are weighed by what is true of them, so that coloured media
+//! have no channel that seldom counts for much: P. Kutz and others, "Spectral and Decomposition Tracking for Rendering
+//! Heterogeneous Volumes", ACM Transactions on Graphics 36, 2017.
 
 use lumbre_math::glam::IVec3;
 use lumbre_math::{DVec3, Elementary, Transform};
@@ -159,7 +160,8 @@ const FAINT: f32 = 0.1;
 const ROUNDED: f32 = 1.0 + 1e-5;
 
 impl HeterogeneousMedium {
-    /// A medium in the box between two points of its own space. Densities and coefficients are neither negative nor infinite.
+    /// A medium in the box between two points of its own space. Densities and coefficients are neither negative nor
+    /// infinite.
     pub fn new(
         medium_from_world: Transform,
         bounds: [DVec3; 2],
@@ -199,8 +201,8 @@ impl HeterogeneousMedium {
                 }
                 channels.unit = Local { absorption: at_absorption, scattering: at_scattering };
             }
-            // A spectrum may be twice as large as the greatest channel of its colour, and that of absorption another than that of
-            // scattering.
+            // A spectrum may be twice as large as the greatest channel of its colour, and that of absorption another
+            // than that of scattering.
             Coefficients::Coloured { .. } => channels.of_majorant = 4.0,
         }
         channels
@@ -270,8 +272,9 @@ impl HeterogeneousMedium {
         Passage { outcome: DistanceSample::Through(left), emitted }
     }
 
-    /// See [`super::Medium::transmittance`]: the product over all tentative collisions of what is not there (J. Novák and others,
-    /// "Residual Ratio Tracking for Estimating Attenuation in Participating Media", ACM Transactions on Graphics 33, 2014).
+    /// See [`super::Medium::transmittance`]: the product over all tentative collisions of what is not there (J. Novák
+    /// and others, "Residual Ratio Tracking for Estimating Attenuation in Participating Media", ACM Transactions on
+    /// Graphics 33, 2014).
     pub(super) fn transmittance(
         &self,
         way: &Way,
@@ -365,7 +368,7 @@ fn within(p: DVec3, bounds: &[DVec3; 2]) -> DVec3 {
     (p - bounds[0]) / (bounds[1] - bounds[0])
 }
 
-/// Whether light of which a part is left goes on: by chance where that is little, for which its weight makes up.
+/// Russian roulette on the remaining light: whether it continues; its weight compensates.
 fn goes_on(weight: &mut Spectrum, part: f32, numbers: &mut PassageNumbers) -> bool {
     if part.is_nan() || part <= 0.0 {
         return false;
@@ -534,8 +537,8 @@ impl Tentative<'_> {
     }
 }
 
-/// The cells that a way goes through, in their order. (J. Amanatides, A. Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing",
-/// Eurographics 1987.)
+/// The cells that a way goes through, in their order. (J. Amanatides, A. Woo, "A Fast Voxel Traversal Algorithm for Ray
+/// Tracing", Eurographics 1987.)
 struct Cells<'a> {
     majorants: &'a Majorants,
     cell: [i64; 3],

@@ -50,7 +50,8 @@ impl HomogeneousMedium {
         self.extinction.map(|sigma| left_after(sigma.into(), distance) as f32)
     }
 
-    /// The part of light that is absorbed, rather than scattered, of what does not come through a distance: σ_a/σ_t (1 − exp(−σ_t d)).
+    /// The part of light that is absorbed, rather than scattered, of what does not come through a distance: σ_a/σ_t (1
+    /// − exp(−σ_t d)).
     pub fn absorbed(&self, distance: f64) -> Spectrum {
         self.transmittance(distance).zip(self.albedo, |left, albedo| (1.0 - left) * (1.0 - albedo))
     }

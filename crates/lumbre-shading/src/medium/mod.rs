@@ -34,7 +34,8 @@ pub enum Medium {
     Homogeneous {
         /// How it absorbs and scatters.
         medium: HomogeneousMedium,
-        /// The radiance that it tends to where it is deep and does not scatter: it emits σ_a times this per unit of length.
+        /// The radiance that it tends to where it is deep and does not scatter: it emits σ_a times this per unit of
+        /// length.
         glow: Spectrum,
         /// What is known of both by wavelength.
         spectra: Option<Box<MediumSpectra>>,
@@ -52,7 +53,8 @@ pub struct Passage {
     pub emitted: Spectrum,
 }
 
-/// A straight way in the world: points `origin` + t `direction` for t from 0 to `length`, which may be infinite. The direction is unit.
+/// A straight way in the world: points `origin` + t `direction` for t from 0 to `length`, which may be infinite. The
+/// direction is unit.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
     /// Where it begins.
@@ -63,7 +65,7 @@ pub struct Way {
     pub length: f64,
 }
 
-/// The random numbers of one passage: two that are even over the samples of a pixel, and as many others as it takes.
+/// The random numbers of one passage: two that are stratified over the samples of a pixel, and any number of others.
 #[derive(Clone, Debug)]
 pub struct PassageNumbers {
     first: [f64; 2],
@@ -125,8 +127,8 @@ impl Medium {
         }
     }
 
-    /// Samples where light of throughput `carried` scatters along a way, if it does. Channels are those of linear Rec. 709, or the
-    /// wavelengths that are given.
+    /// Samples where light of throughput `carried` scatters along a way, if it does. Channels are those of linear Rec.
+    /// 709, or the wavelengths that are given.
     pub fn sample(
         &self,
         way: &Way,

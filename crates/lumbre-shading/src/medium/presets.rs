@@ -2,11 +2,12 @@
 
 use crate::Spectrum;
 
-/// The reduced scattering and the absorption coefficient of a measured medium, per millimetre, in linear Rec. 709; `None` for a name
-/// that is not one of [`preset_names`].
+/// The reduced scattering and the absorption coefficient of a measured medium, per millimetre, in linear Rec. 709;
+/// `None` for a name that is not one of [`preset_names`].
 ///
-/// The first twelve: H. W. Jensen, S. Marschner, M. Levoy, P. Hanrahan, "A Practical Model for Subsurface Light Transport", SIGGRAPH
-/// 2001; the others: S. Narasimhan and others, "Acquiring Scattering Properties of Participating Media by Dilution", SIGGRAPH 2006.
+/// The first twelve: H. W. Jensen, S. Marschner, M. Levoy, P. Hanrahan, "A Practical Model for Subsurface Light
+/// Transport", SIGGRAPH 2001; the others: S. Narasimhan and others, "Acquiring Scattering Properties of Participating
+/// Media by Dilution", SIGGRAPH 2006.
 pub fn preset(name: &str) -> Option<(Spectrum, Spectrum)> {
     PRESETS.iter().find(|preset| preset.0 == name).map(|preset| (preset.1.into(), preset.2.into()))
 }

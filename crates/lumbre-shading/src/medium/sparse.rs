@@ -13,9 +13,9 @@ const SPAN: i32 = BRICK * BLOCK;
 /// Blocks at most of a grid: in practice some thousand.
 const MAX_BLOCKS: usize = 1 << 24;
 
-/// Values at whole coordinates of index space, in bricks of 8³ voxels where they vary, interpolated linearly; a background value
-/// elsewhere. The layout that sparse volumes have in files (K. Museth, "VDB: High-Resolution Sparse Volumes with Dynamic Topology",
-/// ACM Transactions on Graphics 32, 2013).
+/// Values at whole coordinates of index space, in bricks of 8³ voxels where they vary, interpolated linearly; a
+/// background value elsewhere. The layout that sparse volumes have in files (K. Museth, "VDB: High-Resolution Sparse
+/// Volumes with Dynamic Topology", ACM Transactions on Graphics 32, 2013).
 #[derive(Clone, Debug)]
 pub struct SparseGrid {
     index_from_medium: Transform,
@@ -51,6 +51,7 @@ pub enum Brick {
 
 /// A sparse grid that cannot be held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SparseGridError {
     /// Its bounds are empty.
     #[error("the grid has no voxel")]
@@ -90,7 +91,8 @@ impl SparseGrid {
         Ok(Self { index_from_medium, bounds, background, first, count, blocks, split, bricks })
     }
 
-    /// Bytes that a grid takes, of this many blocks within its bounds, of which some are split, and this many bricks of values.
+    /// Bytes that a grid takes, with this many blocks within its bounds, this many split ones, and this many bricks of
+    /// values.
     pub fn memory_of(blocks: u64, split: u64, bricks: u64) -> u64 {
         let cells = blocks.saturating_add(split.saturating_mul((BLOCK * BLOCK * BLOCK) as u64));
         let bricks = bricks.saturating_mul(size_of::<[f32; 512]>() as u64);
@@ -213,7 +215,8 @@ impl SparseGrid {
         greatest
     }
 
-    /// Visits parts that may hold more than the background, by their first and last voxels, with the most that each holds.
+    /// Visits parts that may hold more than the background, by their first and last voxels, with the most that each
+    /// holds.
     pub(super) fn each(&self, mut visit: impl FnMut([IVec3; 2], f32)) {
         let mut visit = |first: IVec3, side: i32, most: f32| {
             if most > self.background {

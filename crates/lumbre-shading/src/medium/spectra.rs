@@ -19,7 +19,7 @@ pub struct MediumSpectra {
 }
 
 impl MediumSpectra {
-    /// A coefficient at some wavelengths, of which this is the colour.
+    /// A coefficient at some wavelengths, from its colour.
     fn coefficient(
         spectrum: Option<&SpectrumValue>,
         scale: f32,
@@ -33,7 +33,7 @@ impl MediumSpectra {
         )
     }
 
-    /// Absorption and scattering at some wavelengths, of which these are the colours.
+    /// Absorption and scattering at some wavelengths, from their colours.
     pub(super) fn coefficients(
         spectra: Option<&Self>,
         [absorption, scattering]: [Spectrum; 2],
@@ -47,7 +47,7 @@ impl MediumSpectra {
         ]
     }
 
-    /// Emitted light at some wavelengths, of which this is the colour.
+    /// Emitted light at some wavelengths, from its colour.
     pub(super) fn glow_at(spectra: Option<&Self>, glow: Spectrum, wavelengths: &Wavelengths) -> Spectrum {
         match spectra.and_then(|spectra| spectra.glow.as_ref()) {
             Some(curve) => wavelengths.curve(curve) * glow.luminance(),

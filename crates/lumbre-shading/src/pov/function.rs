@@ -75,7 +75,7 @@ impl Function {
 /// The number of an operation, whose result it is.
 pub type Register = u32;
 
-/// An expression as a list of operations, each of which may use the results of those before it.
+/// An expression as a list of operations, which may use earlier results.
 #[derive(Clone, Debug)]
 pub struct Code {
     /// How many arguments it has.

@@ -34,8 +34,8 @@ pub struct Scattering {
     pub extinction: f32,
 }
 
-/// How much light is scattered by the angle, with POV-Ray's factors: the mean over the sphere is 1, but about 1.15 of haze, 1.25 of
-/// murky air and 1.07 of Rayleigh's.
+/// How much light is scattered by the angle, with POV-Ray's factors: the mean over the sphere is 1, but about 1.15 of
+/// haze, 1.25 of murky air and 1.07 of Rayleigh's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Phase {
     /// The same everywhere.

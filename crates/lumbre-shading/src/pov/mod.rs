@@ -1,5 +1,5 @@
-//! POV-Ray's textures: pigments, normals and finishes of a surface, as the `pov` integrator lights them, and what a path tracer
-//! takes them for.
+//! POV-Ray's textures: pigments, normals and finishes of a surface, as the `pov` integrator lights them, and what a
+//! path tracer takes them for.
 //!
 //! All arithmetic on colours is done in the scene's working space (see `assumed_gamma` of POV-Ray).
 

@@ -90,7 +90,7 @@ pub const NAMES: [&str; 79] = [
     "noise_generator",
 ];
 
-/// Those that are not here.
+/// Functions that are not implemented.
 pub const MISSING: [&str; 6] = ["comma", "enneper", "helical_torus", "hex_x", "hex_y", "mesh1"];
 
 /// Whether the function of a number is here.
@@ -100,7 +100,7 @@ pub fn is_known(index: u32) -> bool {
         .is_some_and(|name| !MISSING.contains(name) && *name != "spiral" && *name != "pattern")
 }
 
-/// The value of the function of a number; 0 for those that are not here.
+/// The value of the function of a number; 0 for functions that are not implemented.
 pub fn value(index: u32, arguments: &[f64]) -> f64 {
     let at = |i: usize| arguments.get(i).copied().unwrap_or(0.0);
     let p = DVec3::new(at(0), at(1), at(2));

@@ -1,6 +1,6 @@
 //! POV-Ray's noise: three generators, turbulence, and the tables that they are made of, all generated.
 //!
-//! Values are those that POV-Ray 3.7 prints, to 5e-11.
+//! Values equal those of POV-Ray 3.7 to 5e-11.
 
 use std::sync::LazyLock;
 
@@ -98,7 +98,8 @@ fn six_digits(x: f64) -> f64 {
     format!("{x:.5e}").parse().unwrap_or(x)
 }
 
-/// Numbers in [0, 1) of MT19937 with its default seed (M. Matsumoto and T. Nishimura, "Mersenne Twister", ACM TOMACS, 1998).
+/// Numbers in [0, 1) of MT19937 with its default seed (M. Matsumoto and T. Nishimura, "Mersenne Twister", ACM TOMACS,
+/// 1998).
 fn mersenne_twister(count: usize) -> Vec<f64> {
     const N: usize = 624;
     let mut state = [0_u32; N];

@@ -36,8 +36,8 @@ impl PovMaterial {
         most.and_then(|(_, layers)| layers.last()).map_or(normal, |layer| layer.normal.as_vec3())
     }
 
-    /// Scattering at a place: the layers from the top, each by its opacity; a diffuse lobe, facets for highlights, a mirror, and what
-    /// passes, straight on or refracted. A share above 1 is cut off.
+    /// Scattering at a place: the layers from the top, each by its opacity; a diffuse lobe, facets for highlights, a
+    /// mirror, and what passes, straight on or refracted. A share above 1 is cut off.
     pub(crate) fn bsdf(&self, at: &TextureContext) -> Uber {
         let eye = self.eye(at, at.normal);
         let mut sum = Lobes::default();
@@ -132,7 +132,8 @@ impl Lobes {
             let (colour, finish) = (layer.colour, layer.finish);
             let tint = linear(colour.rgb);
             self.diffuse += left * tint * (material.opacity(colour).max(0.0) * finish.diffuse);
-            // The albedo of a highlight, and the roughness by the exponent of the half vector, which for phong is four times as large.
+            // The albedo of a highlight, and the roughness by the exponent of the half vector, which for phong is four
+            // times as large.
             let mut highlight = |strength: f32, exponent: f32, albedo: f32| {
                 if strength <= 0.0 {
                     return;

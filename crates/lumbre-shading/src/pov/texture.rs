@@ -150,7 +150,7 @@ impl Texture {
     pub fn moved(self: &Arc<Self>, map: &Arc<Transform>) -> Arc<Self> {
         let mut moved = (**self).clone();
         match &mut moved.kind {
-            // Each layer is moved by itself, so that its normal is in one space with it.
+            // Each layer is transformed separately, so that its normal is in the same space.
             TextureKind::Layers(textures) if !moved.uv => {
                 *textures = textures.iter().map(|texture| texture.moved(map)).collect();
             }

@@ -91,7 +91,8 @@ impl Warps {
         self.0.iter().rev().fold(p, |p, warp| warp.apply(p))
     }
 
-    /// A normal, or a direction from the light's point of view, in the space of the pattern, and back: by the transforms alone.
+    /// A normal, or a direction from the light's point of view, in the space of the pattern, and back: by the
+    /// transforms alone.
     pub fn normal_to_pattern(&self, n: DVec3) -> DVec3 {
         self.0.iter().rev().fold(n, |n, warp| match warp {
             Warp::Transform(map) => map.inverse_normal(n),

@@ -96,8 +96,9 @@ impl SpectrumValue {
     }
 }
 
-/// The colours of black bodies by their temperature, each relative to its greatest spectral radiance: the integral of B/max B with the
-/// observer's functions, in linear Rec. 709. (Dark where most of a body's light is invisible; a luminance of 105 at 5000 K.)
+/// The colours of black bodies by their temperature, each relative to its greatest spectral radiance: the integral of
+/// B/max B with the observer's functions, in linear Rec. 709. (Dark where most of a body's light is invisible; a
+/// luminance of 105 at 5000 K.)
 #[derive(Clone, Debug)]
 pub struct BlackbodyColours {
     hottest: f32,
@@ -129,8 +130,8 @@ impl BlackbodyColours {
 ///
 /// Three channels cannot hold the spectrum, but can preserve the reflectance at normal incidence: η is the mean
 /// over each channel's wavelengths, and k is solved for so that the channel's reflectance
-/// ((η − 1)² + k²) / ((η + 1)² + k²) is that of the spectrum under D65. Where no k can (η alone reflects more), k is 0 and η is
-/// adjusted. When either is a colour, both are taken channel by channel.
+/// ((η − 1)² + k²) / ((η + 1)² + k²) is that of the spectrum under D65. Where no k can (η alone reflects more), k is 0
+/// and η is adjusted. When either is a colour, both are taken channel by channel.
 pub fn conductor_rgb(eta: &SpectrumValue, k: &SpectrumValue) -> (Spectrum, Spectrum) {
     if matches!(eta, SpectrumValue::Rgb(_)) || matches!(k, SpectrumValue::Rgb(_)) {
         return (eta.unbounded_rgb(), k.unbounded_rgb());
@@ -217,7 +218,8 @@ fn weigh(mut value: impl FnMut(f64) -> f64) -> Spectrum {
     spectrum(std::array::from_fn(|c| rgb[c] / WHITE[c]))
 }
 
-/// What a sensor of this sensitivity by wavelength in nm records of light that has the spectrum of D65 and luminance (CIE Y) 1.
+/// What a sensor of this sensitivity by wavelength in nm records of light that has the spectrum of D65 and luminance
+/// (CIE Y) 1.
 pub fn response_to_d65(mut sensitivity: impl FnMut(f64) -> f64) -> f64 {
     let wavelengths = || (0..=(LAST_NM - FIRST_NM) as u32).map(|i| FIRST_NM + f64::from(i));
     let luminance: f64 = wavelengths().map(|nm| matching(nm)[1] * named::d65(nm)).sum();
@@ -225,8 +227,9 @@ pub fn response_to_d65(mut sensitivity: impl FnMut(f64) -> f64) -> f64 {
     recorded / luminance
 }
 
-/// For each of these ascending wavelengths in nm, what a value there adds to each channel of a spectrum that is linear between them and
-/// constant beyond, weighed as [`SpectrumValue::reflectance_rgb`] does, but not clipped. Weights of a channel sum to 1.
+/// For each of these ascending wavelengths in nm, what a value there adds to each channel of a spectrum that is linear
+/// between them and constant beyond, weighed as [`SpectrumValue::reflectance_rgb`] does, but not clipped. Weights of a
+/// channel sum to 1.
 pub fn channel_weights(nm: &[f32]) -> Vec<[f64; 3]> {
     let mut weights = vec![[0.0; 3]; nm.len()];
     let mut add = |i: usize, share: f64, light: [f64; 3]| {

@@ -1,10 +1,10 @@
 //! The built-in spectra: published tables and formulas.
 //!
 //! - Glasses: Sellmeier's formula with the coefficients of the SCHOTT catalogue of 2017.
-//! - Metals: the tables of pbrt-v4, so that its scenes keep their colours. Silver, aluminium, gold, copper and titanium dioxide
-//!   are measurements as it publishes them. Brass (CuZn) is Querry, "Optical Constants", Contractor Report CRDC-CR-85034, 1985, of
-//!   70 % copper and 30 % zinc. Magnesium oxide is Stephens and Malitson, "Index of Refraction of Magnesium Oxide", Journal of
-//!   Research of the National Bureau of Standards 49(4), 1952; it does not absorb.
+//! - Metals: the tables of pbrt-v4, so that its scenes keep their colours. Silver, aluminium, gold, copper and titanium
+//!   dioxide are measurements as it publishes them. Brass (CuZn) is Querry, "Optical Constants", Contractor Report
+//!   CRDC-CR-85034, 1985, of 70 % copper and 30 % zinc. Magnesium oxide is Stephens and Malitson, "Index of Refraction
+//!   of Magnesium Oxide", Journal of Research of the National Bureau of Standards 49(4), 1952; it does not absorb.
 //! - CIE illuminants: CIE 15:2018. D50, D65 and the D60 of ACES follow the daylight formula.
 
 use super::{fluorescent, interpolate};

@@ -9,8 +9,8 @@ pub struct SensorCurves {
     pub first_nm: f32,
     /// The step between wavelengths, in nm.
     pub step_nm: f32,
-    /// By rows, the linear Rec. 709 of the picture of what red, green and blue record of light, relative to the luminance of light
-    /// with a constant spectrum.
+    /// By rows, the linear Rec. 709 of the picture of what red, green and blue record of light, relative to the
+    /// luminance of light with a constant spectrum.
     pub rec709: [[f32; 3]; 3],
 }
 

@@ -1,9 +1,10 @@
 //! Smooth spectra of colours.
 //!
-//! Jakob and Hanika, "A Low-Dimensional Function Space for Efficient Spectral Upsampling", Eurographics 2019: a reflectance is a sigmoid of
-//! a quadratic polynomial of the wavelength, whose three coefficients are fitted so that its colour under D65 is the given one. We fit
-//! single colours exactly when they are first looked up, and look up what varies from place to place in a table of
-//! [`Table::SIZE`]³ nodes for each greatest channel (theirs has 64³), which is made at its first use.
+//! Jakob and Hanika, "A Low-Dimensional Function Space for Efficient Spectral Upsampling", Eurographics 2019: a
+//! reflectance is a sigmoid of a quadratic polynomial of the wavelength, whose three coefficients are fitted so that
+//! its colour under D65 is the given one. We fit single colours exactly when they are first looked up, and look up what
+//! varies from place to place in a table of [`Table::SIZE`]³ nodes for each greatest channel (theirs has 64³), which is
+//! made at its first use.
 
 use std::array;
 use std::cell::RefCell;
@@ -27,7 +28,8 @@ const MIDDLE_NM: f64 = 595.0;
 const HALF_NM: f64 = 235.0;
 /// A polynomial that stands for infinity: its square is infinite in single precision, so its sigmoid is 0 or 1.
 const STEEPEST: f64 = 1e30;
-/// Fits of colours that no sigmoid has, faces and corners of the cube, are held to coefficients of this size, as in the original.
+/// Fits of colours that no sigmoid has, faces and corners of the cube, are held to coefficients of this size, as in the
+/// original.
 const MAX_COEFFICIENT: f64 = 200.0;
 
 impl Sigmoid {
@@ -40,7 +42,8 @@ impl Sigmoid {
         cached(colour)
     }
 
-    /// [`Self::of`] from a table and a step of Newton's method, with an error of less than a thousandth for most colours.
+    /// [`Self::of`] from a table and a step of Newton's method, with an error of less than a thousandth for most
+    /// colours.
     pub fn by_table(colour: Spectrum) -> Self {
         static TABLE: LazyLock<Table> = LazyLock::new(Table::new);
         let colour = colour.map(crate::unit);
@@ -93,7 +96,7 @@ fn inverse(value: f64) -> f64 {
     ((v - 0.5) / (v * (1.0 - v)).sqrt()).clamp(-STEEPEST, STEEPEST)
 }
 
-/// The fit of a colour that is not grey, from those that are kept.
+/// The fit of a colour that is not grey, from the table.
 fn cached(colour: Spectrum) -> Sigmoid {
     type Key = [u32; 3];
     /// Fits that are kept for all threads.

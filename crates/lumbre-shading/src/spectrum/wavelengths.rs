@@ -12,8 +12,9 @@ use crate::Spectrum;
 
 /// Three wavelengths, one a channel, with the densities that they were chosen with.
 ///
-/// The first is chosen at random, the others are a third of the distribution away each: A. Wilkie and others, "Hero Wavelength Spectral
-/// Sampling", EGSR 2014. Radiance at a wavelength is in units in which light of a constant spectrum of 1 has luminance 1.
+/// The first is chosen at random, the others are a third of the distribution away each: A. Wilkie and others, "Hero
+/// Wavelength Spectral Sampling", EGSR 2014. Radiance at a wavelength is in units in which light of a constant spectrum
+/// of 1 has luminance 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wavelengths {
     /// In nm.
@@ -66,8 +67,8 @@ impl Wavelengths {
 
     /// Wavelengths by one number in [0, 1), denser where the eye sees more.
     ///
-    /// The density is proportional to 1 / cosh²(0.0072 (λ − 538 nm)) between 360 and 830 nm, as in pbrt-v4: M. Radziszewski, K. Boryczko,
-    /// W. Alda, "An Improved Technique for Full Spectral Rendering", WSCG 2009.
+    /// The density is proportional to 1 / cosh²(0.0072 (λ − 538 nm)) between 360 and 830 nm, as in pbrt-v4: M.
+    /// Radziszewski, K. Boryczko, W. Alda, "An Improved Technique for Full Spectral Rendering", WSCG 2009.
     pub fn visible(u: f32) -> Self {
         let numbers = thirds(u);
         // tanh(0.0072 (λ − 538)), with the sign turned.
@@ -172,8 +173,8 @@ impl Wavelengths {
         Spectrum::new(r, g, b)
     }
 
-    /// The radiance of a black body of a temperature in kelvin, relative to the greatest that it has at any wavelength, as
-    /// [`BlackbodyColours`](super::BlackbodyColours).
+    /// The radiance of a black body of a temperature in kelvin, relative to the greatest that it has at any wavelength,
+    /// as [`BlackbodyColours`](super::BlackbodyColours).
     pub(crate) fn blackbody(&self, kelvin: f32) -> Spectrum {
         let [even, _] = *LUMINANCE;
         let [r, g, b] = self.nm.map(|nm| (even * blackbody(nm.into(), kelvin.into())) as f32);

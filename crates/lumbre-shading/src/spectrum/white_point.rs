@@ -2,10 +2,12 @@
 
 use super::{blackbody, observe};
 
-/// The chromaticity (CIE 1931 x and y) of light of a correlated colour temperature in kelvin: daylight of that temperature, or a black body
-/// below 4000 K, as pbrt takes it for a white balance. `None` where a temperature is not positive, or so low that nothing is seen.
+/// The chromaticity (CIE 1931 x and y) of light of a correlated colour temperature in kelvin: daylight of that
+/// temperature, or a black body below 4000 K, as pbrt takes it for a white balance. `None` where a temperature is not
+/// positive, or so low that nothing is seen.
 ///
-/// Temperatures are taken by the constant of radiation of the time when daylight was tabulated (1.4380 cm K). Daylight after CIE 15:2018.
+/// Temperatures are taken by the constant of radiation of the time when daylight was tabulated (1.4380 cm K). Daylight
+/// after CIE 15:2018.
 pub fn white_point(kelvin: f64) -> Option<[f64; 2]> {
     let kelvin = kelvin * (1.4388 / 1.4380);
     if kelvin < 4000.0 {

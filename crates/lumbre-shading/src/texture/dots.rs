@@ -5,8 +5,8 @@ use lumbre_math::{DVec2, Vec2};
 
 const RADIUS: f64 = 0.35;
 
-/// Whether a place is in a dot. Each square of one unit about whole coordinates has a dot of radius 0.35 or none, by chance, so far from its
-/// middle that it stays inside; the numbers that decide are those of pbrt.
+/// Whether a place is in a dot. Each square of one unit about whole coordinates has a dot of radius 0.35 or none, by
+/// chance, so far from its middle that it stays inside; the numbers that decide are those of pbrt.
 pub(super) fn is_inside(st: Vec2) -> bool {
     let st = st.as_dvec2();
     let square = (st + 0.5).floor();

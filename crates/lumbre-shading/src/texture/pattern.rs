@@ -1,6 +1,7 @@
 //! Patterns of gradient noise in space: clouds, creases, waves and marble.
 //!
-//! D. Ebert and others, "Texturing and Modeling: A Procedural Approach", 3rd edition, 2003; with the constants of pbrt-v4.
+//! D. Ebert and others, "Texturing and Modeling: A Procedural Approach", 3rd edition, 2003; with the constants of
+//! pbrt-v4.
 
 use std::sync::Arc;
 
@@ -43,7 +44,7 @@ pub enum PatternKind {
 const GUSTS: Octaves = Octaves { count: 3, roughness: 0.5 };
 const WAVES: Octaves = Octaves { count: 6, roughness: 0.5 };
 
-/// The colours of marble, of which four and four are the points of a cubic Bézier curve.
+/// The colours of marble; each four are the points of a cubic Bézier curve.
 const MARBLE: [Spectrum; 9] = {
     let pale = Spectrum::new(0.58, 0.58, 0.6);
     let grey = Spectrum::new(0.5, 0.5, 0.5);

@@ -1,7 +1,8 @@
-//! Eight lanes of AVX2 and sixteen of AVX-512: with `instruction_set` and `neon`, the fence around this crate's `unsafe`.
+//! Eight lanes of AVX2 and sixteen of AVX-512: with `instruction_set` and `neon`, the fence around this crate's
+//! `unsafe`.
 //!
-//! The types of lanes are private. Code reaches them as the `R` of a [`Job`] alone, below [`OnX86::run_avx2`] and [`OnX86::run_avx512`], so
-//! that wherever a method of theirs runs, the machine has the instructions.
+//! The types of lanes are private. Code reaches them as the `R` of a [`Job`] alone, below [`OnX86::run_avx2`] and
+//! [`OnX86::run_avx512`], so that wherever a method of theirs runs, the machine has the instructions.
 
 #![allow(unsafe_code)]
 
@@ -10,7 +11,7 @@ mod avx512;
 
 use crate::{Job, Real, Task};
 
-/// Jobs on x86; a trait, so that each is compiled beside its own type.
+/// Jobs on x86; a trait, so that each is compiled with its own type.
 pub(crate) trait OnX86: Job + Sized {
     /// # Safety
     /// The machine has these features.

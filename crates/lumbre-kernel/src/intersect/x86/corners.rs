@@ -95,7 +95,8 @@ impl<const AVX512: bool> X86<AVX512> {
         first: usize,
     ) -> [Eight256<AVX512>; 3] {
         let words = block.words().as_ptr();
-        // SAFETY: see `X86`. Of rows of a block that shares its vertices the first sixteen are read, of others the first twenty-four.
+        // SAFETY: see `X86`. Of rows of a block that shares its vertices the first sixteen are read, of others the
+        // first twenty-four.
         let vertices = unsafe {
             [
                 Eight256::new(_mm256_loadu_ps(words.add(kx as usize + first))),

@@ -26,7 +26,7 @@ use crate::tree::filter_start::FilterStart;
 use crate::tree::node::{LARGEST_NEAR, SMALLEST_NEAR, TINY_NEAR, TreeSpace};
 use crate::tree::triangle_block::{TriangleBlock, shared_row};
 
-/// The operations of both levels. Only roots that enable AVX-512 instantiate `X86<true>`, and only those that enable
+/// The operations of both levels. Only roots that enable AVX-512 instantiate `X86<true>`, and only roots that enable
 /// AVX2 `X86<false>`, so the instructions below are available.
 pub(crate) struct X86<const AVX512: bool>;
 
@@ -326,7 +326,8 @@ where
         };
         let (low, high) = (Self::rows_of_eight(first), Self::rows_of_eight(last));
         for (row, (low, high)) in rows.iter_mut().zip(low.into_iter().zip(high)) {
-            // SAFETY: see `X86`. The stores are of sixteen f32, or of eight from the first or the ninth on, into an array of sixteen.
+            // SAFETY: see `X86`. The stores are of sixteen f32, or of eight from the first or the ninth on, into an
+            // array of sixteen.
             unsafe {
                 let row = row.0.as_mut_ptr();
                 if AVX512 {
@@ -355,8 +356,8 @@ where
                 let at = |i: usize| Self::numbers(&rays[4 * four + i]).wrapping_add(4 * half);
                 let (a, b, c, d) = (at(0), at(1), at(2), at(3));
                 let columns = &mut columns[4 * half..][..4];
-                // SAFETY: see `X86`. The loads are of the first or the last four of the eight numbers of a ray, see above; the
-                // stores of four f64 from a multiple of four below sixteen on, into arrays of sixteen.
+                // SAFETY: see `X86`. The loads are of the first or the last four of the eight numbers of a ray, see
+                // above; the stores of four f64 from a multiple of four below sixteen on, into arrays of sixteen.
                 unsafe {
                     let (a, b) = (_mm256_loadu_pd(a), _mm256_loadu_pd(b));
                     let (c, d) = (_mm256_loadu_pd(c), _mm256_loadu_pd(d));

@@ -29,8 +29,8 @@ impl<const AVX512: bool> X86<AVX512> {
         const ODD: i32 = 0b11_01_11_01;
         for half in 0..2 {
             let at = |i: usize| Self::numbers(&rays[8 * half + i]);
-            // SAFETY: see `X86`; only called where `AVX512` is. The loads are of the eight numbers of a ray, see above; the stores of
-            // eight f64 from the first or the ninth on, into arrays of sixteen.
+            // SAFETY: see `X86`; only called where `AVX512` is. The loads are of the eight numbers of a ray, see above;
+            // the stores of eight f64 from the first or the ninth on, into arrays of sixteen.
             unsafe {
                 // One by one: a closure may become a call.
                 let (a, b, c, d) = (

@@ -77,7 +77,7 @@ impl Avx2 {
     /// Eight words from here on, those of the mask first; the others are undefined.
     ///
     /// # Safety
-    /// There are as many.
+    /// Lanes of both halves together.
     #[inline(always)]
     unsafe fn chosen(mask: u32, words: *const u32) -> __m256i {
         // SAFETY: see the type, and above. The other load is of one of the table's rows of eight bytes.
@@ -291,9 +291,9 @@ impl F32x16 for Avx2 {
     }
 
     #[inline(always)]
-    fn reduce_max_of_eight(them: [Self; 8]) -> [f32; 8] {
-        let abcd = Self::max_of_four(them[0], them[1], them[2], them[3]);
-        let efgh = Self::max_of_four(them[4], them[5], them[6], them[7]);
+    fn reduce_max_of_eight(vectors: [Self; 8]) -> [f32; 8] {
+        let abcd = Self::max_of_four(vectors[0], vectors[1], vectors[2], vectors[3]);
+        let efgh = Self::max_of_four(vectors[4], vectors[5], vectors[6], vectors[7]);
         let mut most = [0.0; 8];
         // SAFETY: see the type. The store is of eight f32.
         unsafe {
@@ -417,7 +417,8 @@ impl F32x16 for Avx2 {
 
     #[inline(always)]
     fn put_chosen(mask: u32, words: &[u32; LANES], place: &mut [MaybeUninit<u32>; LANES]) {
-        // SAFETY: see the type. The loads are of eight u32 each, of sixteen; so are the stores, the second no farther than eight on.
+        // SAFETY: see the type. The loads are of eight u32 each, of sixteen; so are the stores, the second no farther
+        // than eight on.
         unsafe {
             let (words, place) = (words.as_ptr(), place.as_mut_ptr());
             let of_low = (mask & 0xff).count_ones() as usize;

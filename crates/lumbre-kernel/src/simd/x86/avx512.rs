@@ -182,9 +182,9 @@ impl F32x16 for Avx512 {
     }
 
     #[inline(always)]
-    fn reduce_max_of_eight(them: [Self; 8]) -> [f32; 8] {
-        let abcd = Self::max_of_four(them[0], them[1], them[2], them[3]);
-        let efgh = Self::max_of_four(them[4], them[5], them[6], them[7]);
+    fn reduce_max_of_eight(vectors: [Self; 8]) -> [f32; 8] {
+        let abcd = Self::max_of_four(vectors[0], vectors[1], vectors[2], vectors[3]);
+        let efgh = Self::max_of_four(vectors[4], vectors[5], vectors[6], vectors[7]);
         let mut most = [0.0; 8];
         // SAFETY: see the type. The store is of eight f32.
         unsafe {

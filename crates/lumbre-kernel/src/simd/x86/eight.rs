@@ -57,8 +57,8 @@ impl<const AVX512: bool> Vector for Eight256<AVX512> {
                 // The maximum by magnitude, without its sign.
                 return Self(_mm256_range_ps::<0b1011>(self.0, other.0));
             }
-            // Numbers without a sign have the order of their bits. As integers, for that is done beside sums and comparisons, not
-            // between them.
+            // Numbers without a sign have the order of their bits. As integers, which execute in parallel with sums and
+            // comparisons, not between them.
             let without_sign = _mm256_set1_epi32(i32::MAX);
             let a = _mm256_and_si256(_mm256_castps_si256(self.0), without_sign);
             let b = _mm256_and_si256(_mm256_castps_si256(other.0), without_sign);
