@@ -18,6 +18,7 @@ mod formula;
 mod include;
 mod languages;
 mod links;
+mod live;
 mod page;
 mod picture;
 
@@ -132,6 +133,7 @@ fn build(mdbook: &Path, quick: bool) -> Result<()> {
     run_mdbook(mdbook, &pages, &html)?;
     languages::mark(&html)?;
     refuse(&links::check(&html, &pages)?)?;
+    live::add(&html)?;
     eprintln!("The book is {}", html.join("index.html").display());
     Ok(())
 }
