@@ -133,7 +133,9 @@ fn build(mdbook: &Path, quick: bool) -> Result<()> {
     run_mdbook(mdbook, &pages, &html)?;
     languages::mark(&html)?;
     refuse(&links::check(&html, &pages)?)?;
-    live::add(&html)?;
+    if live::add(&html)? && quick {
+        crate::web::test_book(&html, &program(quick)?)?;
+    }
     eprintln!("The book is {}", html.join("index.html").display());
     Ok(())
 }

@@ -190,6 +190,7 @@ fn test(pictures: Option<&Path>) -> Result<()> {
     let [program, package, playground] =
         [&program, &package, &playground].map(|path: &PathBuf| path.to_string_lossy());
     run_with("node", &[&format!("{FOLDER}/tests/node.mjs")], &[("LUMBRE", &program), ("PACKAGE", &package)])?;
+    run_with("node", &[&format!("{FOLDER}/tests/shell.mjs")], &[("PACKAGE", &package)])?;
     let Some(browser) = crate::page::browser() else {
         eprintln!("\nThe playground is not tried: it needs Chromium (Debian: apt-get install chromium)");
         return Ok(());
@@ -202,4 +203,16 @@ fn test(pictures: Option<&Path>) -> Result<()> {
         words.extend(["--pictures", pictures]);
     }
     run_with("node", &words, &[("LUMBRE", &program), ("CHROMIUM", &browser), ("PLAYGROUND", &playground)])
+}
+
+/// Tries the live parts of a built book, as far as there is what that needs.
+pub(crate) fn test_book(html: &Path, program: &Path) -> Result<()> {
+    let is_installed = root().join(FOLDER).join("node_modules/playwright-core").is_dir();
+    let (true, Some(browser)) = (is_installed, crate::page::browser()) else {
+        eprintln!("\nThe live parts of the book are not tried: they need cargo xtask web, and Chromium");
+        return Ok(());
+    };
+    let [browser, html, program] = [&browser, html, program].map(Path::to_string_lossy);
+    let environment = [("LUMBRE", &*program), ("CHROMIUM", &*browser), ("BOOK", &*html)];
+    run_with("node", &[&format!("{FOLDER}/tests/book.mjs")], &environment)
 }

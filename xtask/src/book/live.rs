@@ -12,14 +12,14 @@ use crate::files;
 /// What of `target/web` the book has.
 const PARTS: [&str; 2] = ["live", "playground"];
 
-/// Puts the live parts beside the built pages, and lets each page load them; says where they are missing.
-pub(super) fn add(html: &Path) -> Result<()> {
+/// Puts the live parts beside the built pages, and lets each page load them. Where they are missing, says so, and the answer is false.
+pub(super) fn add(html: &Path) -> Result<bool> {
     let web = target().join("web");
     if PARTS.iter().any(|part| !web.join(part).is_dir()) {
         eprintln!("\nThe book has no live parts, which need WebAssembly: cargo xtask web makes them");
-        return Ok(());
+        return Ok(false);
     }
-    add_from(&web, html)
+    add_from(&web, html).map(|()| true)
 }
 
 fn add_from(web: &Path, html: &Path) -> Result<()> {

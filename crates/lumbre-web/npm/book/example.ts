@@ -7,10 +7,10 @@ import { word } from "./words.js";
 /** Milliseconds after the last key until a command is run. */
 const TYPED = 200;
 
-/** Lets the example in this block of code be tried, if all of its commands are known. */
+/** Lets the example in this block of code be tried, if one of its commands is known; the others stay as they are. */
 export function example(block: HTMLPreElement, engine: Engine): boolean {
   const all = commandsOf(block.textContent ?? "");
-  if (all.length === 0 || !all.every(({ command }) => isKnown(command))) return false;
+  if (!all.some(({ command }) => isKnown(command))) return false;
   const bar = make("div", { className: "live-bar" });
   const start = button(word("try"), () => {
     const part = opened(all, engine, () => {
@@ -46,16 +46,17 @@ function opened(all: ReturnType<typeof commandsOf>, engine: Engine, close: () =>
   const part = make("section", { className: "live live-example", "aria-label": word("try") });
   part.append(make("p", { className: "live-hint", textContent: word("commands") }));
   const fields = all.map(({ command, output }) => {
-    const input = make("textarea", { className: "live-command", value: command, rows: 1, spellcheck: false, "aria-label": word("command"), "autocapitalize": "off" });
+    const known = isKnown(command);
+    const input = make("textarea", { className: "live-command", value: command, rows: 1, spellcheck: false, readOnly: !known, "aria-label": word("command"), "autocapitalize": "off" });
     const out = make("pre", { className: "live-output", textContent: output, tabIndex: 0, role: "region", "aria-label": word("output") });
     const status = make("p", { className: "live-wrong", role: "status" });
     part.append(make("div", { className: "live-line" }, make("span", { textContent: "$", "aria-hidden": "true" }), input), out, status);
-    return { input, out, status, output };
+    return { input, out, status, output, known };
   });
   const run = latest(async (from: number) => {
-    for (const [i, { input, out, status, output }] of fields.entries()) {
+    for (const [i, { input, out, status, output, known }] of fields.entries()) {
       // What a later command reads may have been written by one before.
-      if (i < from) continue;
+      if (i < from || !known) continue;
       part.setAttribute("aria-busy", "true");
       try {
         await engine.held.ready();

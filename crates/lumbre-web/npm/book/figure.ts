@@ -9,6 +9,9 @@ type Vector = [number, number, number];
 /** Whether a command explains a ray of its own. */
 export const isFigured = (command: string): boolean => /lumbre explain .*--ray[ =]/.test(command) && !/^\s*for\s/.test(command);
 
+/** Whether a figure of it is large enough to see: rays from far away are for their numbers. */
+export const isNear = (command: string): boolean => (/--ray[ =](\S+)/.exec(command)?.[1] ?? "").split(",").every((x) => Math.abs(Number(x)) < 1000);
+
 /** The marks of the sketch that are parameters of shapes, by the names that pbrt has for them. */
 const PARAMETERS: Record<string, string[]> = {
   C: ["center"],

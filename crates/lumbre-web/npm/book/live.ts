@@ -1,7 +1,7 @@
 // The live parts of the book: examples, scenes and figures are edited and run where they stand. Without this script the pages are whole.
 import { Engine, button } from "./engine.js";
 import { example } from "./example.js";
-import { FigureOf, isFigured } from "./figure.js";
+import { FigureOf, isFigured, isNear } from "./figure.js";
 import { scene } from "./scene.js";
 import { commandsOf } from "./shell.js";
 import { word } from "./words.js";
@@ -42,7 +42,7 @@ async function begin(): Promise<void> {
   for (const block of blocks) {
     if (!block.querySelector("code.language-console")) continue;
     example(block, engine);
-    if (!figured) figured = commandsOf(block.textContent ?? "").find(({ command }) => isFigured(command))?.command ?? "";
+    if (!figured) figured = commandsOf(block.textContent ?? "").find(({ command }) => isFigured(command) && isNear(command))?.command ?? "";
   }
   // The first figure of a chapter becomes that of its first ray.
   const drawn = content.querySelector('img[src*="figures/"]')?.closest("p");

@@ -221,10 +221,11 @@ export function isKnown(line: string): boolean {
   try {
     return parts(words(body)).every((part) => {
       const bars = part.flatMap((word, i) => (word.bare && word.text === "|" ? [i] : []));
-      return [0, ...bars.map((i) => i + 1)].every((start) => {
+      return [0, ...bars.map((i) => i + 1)].every((start, i) => {
         const [name, verb] = [part[start]?.text ?? "", part[start + 1]?.text ?? ""];
-        if (name === "lumbre") return ["math", "explain", "cast"].includes(verb) && !part.some((word) => word.text === "-o");
-        return ["echo", "printf", "sed", "grep", "head", "tail", "cat"].includes(name);
+        const own = part.slice(start, bars[i]);
+        if (name === "lumbre") return ["math", "explain", "cast"].includes(verb) && !own.some((word) => word.text === "-o");
+        return ["echo", "printf", "sed", "cat", ...(i > 0 ? ["grep", "head", "tail"] : [])].includes(name);
       });
     });
   } catch {

@@ -34,7 +34,9 @@ function only(ready: Lumbre, files: SceneFiles, name: string, size: Wanted): Sce
   return asked.scene;
 }
 
-const warned = (scene: Scene): string => scene.warnings.map((line) => `${line}\n`).join("");
+/** What reading warned of; that there is no light is said of pictures alone. */
+const warned = (scene: Scene): string =>
+  scene.warnings.filter((line) => !line.endsWith(": the scene has no light, its picture is black")).map((line) => `${line}\n`).join("");
 
 function problem(error: unknown): Problem {
   return error instanceof LumbreError ? error.problem : { kind: "crash", message: String(error) };
