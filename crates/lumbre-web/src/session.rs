@@ -169,7 +169,10 @@ impl Session {
     /// [`ProblemKind::Usage`] where there are none of these rows, and for a picture that is denoised, which has to be whole.
     pub fn limit_rows(&mut self, from: u32, to: u32) -> Result<(), Problem> {
         if self.options.guides {
-            return Err(Problem::new(ProblemKind::Usage, "a picture that is denoised is rendered as a whole"));
+            return Err(Problem::new(
+                ProblemKind::Usage,
+                "a picture that is denoised is rendered as a whole",
+            ));
         }
         let mut options = self.options.clone();
         let rows = PixelBounds { x0: 0, y0: from, x1: options.width, y1: to };

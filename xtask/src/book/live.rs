@@ -36,8 +36,9 @@ fn add_from(web: &Path, html: &Path) -> Result<()> {
 fn with_script(text: &str, depth: usize) -> Result<String> {
     let up = "../".repeat(depth);
     let (head, rest) = text.split_once("</head>").context("a page without a head")?;
-    let more =
-        format!("<link rel=\"stylesheet\" href=\"{up}live/live.css\">\n<script defer src=\"{up}live/live.js\"></script>\n");
+    let more = format!(
+        "<link rel=\"stylesheet\" href=\"{up}live/live.css\">\n<script defer src=\"{up}live/live.js\"></script>\n"
+    );
     Ok(format!("{head}{more}</head>{rest}"))
 }
 
@@ -55,12 +56,16 @@ mod tests {
         }
         fs::create_dir_all(html.join("es/light")).expect("a folder");
         for page in ["index.html", "es/light/a.html"] {
-            fs::write(html.join(page), "<html><head><title>a</title></head><body></body></html>").expect("a file");
+            fs::write(html.join(page), "<html><head><title>a</title></head><body></body></html>")
+                .expect("a file");
         }
         add_from(&web, &html).expect("both parts are there");
         let read = |page: &str| fs::read_to_string(html.join(page)).expect("a page");
         assert!(read("index.html").contains("<script defer src=\"live/live.js\">"));
-        assert!(read("es/light/a.html").contains("<script defer src=\"../../live/live.js\"></script>\n</head><body>"));
+        assert!(
+            read("es/light/a.html")
+                .contains("<script defer src=\"../../live/live.js\"></script>\n</head><body>")
+        );
         // The pages of the parts have their own.
         assert_eq!(read("playground/index.html"), "<head></head>");
         with_script("no page", 0).expect_err("it has no head");

@@ -45,10 +45,11 @@ export function example(block: HTMLPreElement, engine: Engine): boolean {
 function opened(all: ReturnType<typeof commandsOf>, engine: Engine, close: () => void): HTMLElement {
   const part = make("section", { className: "live live-example", "aria-label": word("try") });
   part.append(make("p", { className: "live-hint", textContent: word("commands") }));
-  const fields = all.map(({ command, output }) => {
+  const fields = all.map(({ command, output }, i) => {
+    const number = all.length > 1 ? ` ${i + 1}` : "";
     const known = isKnown(command);
-    const input = make("textarea", { className: "live-command", value: command, rows: 1, spellcheck: false, readOnly: !known, "aria-label": word("command"), "autocapitalize": "off" });
-    const out = make("pre", { className: "live-output", textContent: output, tabIndex: 0, role: "region", "aria-label": word("output") });
+    const input = make("textarea", { className: "live-command", value: command, rows: 1, spellcheck: false, readOnly: !known, "aria-label": word("command") + number, "autocapitalize": "off" });
+    const out = make("pre", { className: "live-output", textContent: output, tabIndex: 0, role: "region", "aria-label": word("output") + number });
     const status = make("p", { className: "live-wrong", role: "status" });
     part.append(make("div", { className: "live-line" }, make("span", { textContent: "$", "aria-hidden": "true" }), input), out, status);
     return { input, out, status, output, known };

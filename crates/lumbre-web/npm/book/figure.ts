@@ -26,6 +26,8 @@ const NUMBER = /[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?/g;
 /** Lines of a scene whose numbers are of shapes and where they stand. */
 const MOVES = /\b(?:Shape|Translate|Scale|Rotate|Transform|ConcatTransform)\b|^\s*"(?:point3?|vector3?|normal3?|float)\b/;
 const OTHERS = /^\s*(?:#|Camera|Film|Sampler|Integrator|LookAt|LightSource|Include|Texture)/;
+/** Whether the book's theme is one of the dark ones, which a reader chooses apart from the system. */
+const isDark = (): boolean => ["navy", "coal", "ayu"].some((theme) => document.documentElement.classList.contains(theme));
 /** Lines longer than this are tables, and not edited here. */
 const LONGEST = 400;
 
@@ -178,15 +180,15 @@ export class FigureOf {
     const found = new DOMParser().parseFromString(page, "text/html");
     const at = this.#root.querySelector<HTMLInputElement>(".slider input")?.value;
     const focused = this.#root.activeElement?.closest("[data-mark]")?.getAttribute("data-mark");
-    const style = make("style", { textContent: `${(found.querySelector("style")?.textContent ?? "").replace(/:root/g, ":host").replace(/\bbody\b/g, ".body").replace(/\bhtml\b/g, ".none")}
+    const style = make("style", { textContent: `${(found.querySelector("style")?.textContent ?? "").replace(/:root/g, ":host").replace("color-scheme: light dark;", `color-scheme: ${isDark() ? "dark" : "light"};`).replace(/\bbody\b/g, ".body").replace(/\bhtml\b/g, ".none")}
 :host { display: block; } .body { margin: 0; max-width: none; padding: 0 0 1rem; background: transparent; font-size: 15px; } h1, #steps { display: none !important; }
 .figured > details > figure { position: static !important; } .sketch [data-mark="O"], .sketch [data-mark="D"], .sketch .mark { cursor: grab; } .sketch { touch-action: none; }` });
     const body = make("div", { className: "body" });
     const main = found.querySelector("main");
     const steps = found.getElementById("steps");
-    if (main) body.append(document.adoptNode(main));
+    // The page that it stands in has a main part already.
+    if (main) body.append(...[...main.childNodes].map((node) => document.adoptNode(node)));
     if (steps) body.append(document.adoptNode(steps));
-    // The page's headings stand below those of the book.
     this.#root.replaceChildren(style, body);
     const code = found.querySelector("script")?.textContent ?? "";
     // The script of the explanation, which adds the slider, in the figure in place of a page.
