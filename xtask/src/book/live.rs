@@ -32,7 +32,7 @@ fn add_from(web: &Path, html: &Path) -> Result<()> {
     PARTS.iter().try_for_each(|part| files::copy(&web.join(part), &html.join(part)))
 }
 
-/// A page so many folders below the book, which loads the live parts.
+/// A page this many folders below the book, which loads the live parts.
 fn with_script(text: &str, depth: usize) -> Result<String> {
     let up = "../".repeat(depth);
     let (head, rest) = text.split_once("</head>").context("a page without a head")?;
