@@ -19,6 +19,7 @@ mod formula;
 mod include;
 mod languages;
 mod links;
+mod live;
 mod page;
 mod picture;
 
@@ -134,6 +135,9 @@ fn build(mdbook: &Path, quick: bool) -> Result<()> {
     run_mdbook(mdbook, &pages, &html)?;
     languages::mark(&html)?;
     refuse(&links::check(&html, &pages)?)?;
+    if live::add(&html)? && quick {
+        crate::web::test_book(&html, &program(quick)?)?;
+    }
     eprintln!("The book is {}", html.join("index.html").display());
     Ok(())
 }

@@ -10,6 +10,8 @@ use xtask::command::{self, root, run, run_with, succeeds, target};
 const FOLDER: &str = "crates/lumbre-web/npm";
 /// What WebAssembly is compiled for.
 const TARGET: &str = "wasm32-unknown-unknown";
+/// How it is compiled.
+const PROFILE: &str = "web";
 /// Vectors of 128 bits, which all browsers have since 2023, and a stack as large as threads of the program have.
 const FLAGS: &str = "-C target-feature=+simd128,+bulk-memory -C link-arg=-zstack-size=8388608";
 /// Debian's own compiler, whose standard library for WebAssembly is compiled from its sources.
@@ -62,6 +64,12 @@ fn missing() -> Result<Vec<String>> {
     if Compiler::find().is_none() {
         let how = "rustup target add wasm32-unknown-unknown, or Debian: apt-get install rustc-web cargo-web rust-web-src lld";
         missing.push(format!("a compiler for {TARGET} ({how})"));
+    }
+    if matches!(Compiler::find(), Some(Compiler::Debian)) && !succeeds("wasm-ld", &["--version"]) {
+        missing.push("wasm-ld (Debian: apt-get install lld)".to_owned());
+    }
+    if !succeeds("wasm-opt", &["--version"]) {
+        missing.push("wasm-opt (Debian: apt-get install binaryen)".to_owned());
     }
     let version = bindgen_version()?;
     if bindgen(&version).is_none() {
@@ -120,7 +128,7 @@ fn build() -> Result<()> {
     let folder = target().join("wasm");
     let folder_text = folder.to_string_lossy().into_owned();
     let environment = [("CARGO_TARGET_DIR", folder_text.as_str()), ("RUSTFLAGS", FLAGS)];
-    let plain = ["build", "--release", "--package", "lumbre-web", "--target", TARGET];
+    let plain = ["build", "--profile", PROFILE, "--package", "lumbre-web", "--lib", "--target", TARGET];
     match Compiler::find() {
         Some(Compiler::Rustup) => run_with("cargo", &plain, &environment)?,
         _ => {
@@ -133,7 +141,7 @@ fn build() -> Result<()> {
     }
     let generated = format!("{FOLDER}/generated");
     std::fs::create_dir_all(root().join(&generated))?;
-    let compiled = folder.join(TARGET).join("release/lumbre_web.wasm");
+    let compiled = folder.join(TARGET).join(PROFILE).join("lumbre_web.wasm");
     let compiled = compiled.to_string_lossy();
     let bindgen = bindgen(&bindgen_version()?).context("wasm-bindgen")?;
     let module = [
@@ -146,11 +154,26 @@ fn build() -> Result<()> {
         &compiled,
     ];
     run(&bindgen, &module)?;
+    shrink(&format!("{generated}/lumbre_web_bg.wasm"))?;
     let install = ["ci", "--prefix", FOLDER, "--ignore-scripts", "--no-audit", "--no-fund"];
     run("npm", &install)?;
     run("npm", &["run", "--prefix", FOLDER, "check"])?;
     let out = out();
     run("node", &[&format!("{FOLDER}/build.mjs"), &out.to_string_lossy()])
+}
+
+/// Makes a module smaller; its numbers stay what they are.
+fn shrink(module: &str) -> Result<()> {
+    let known = [
+        "--enable-simd",
+        "--enable-bulk-memory",
+        "--enable-mutable-globals",
+        "--enable-sign-ext",
+        "--enable-nontrapping-float-to-int",
+        "--enable-reference-types",
+        "--enable-multivalue",
+    ];
+    run("wasm-opt", &[&known[..], &["-Oz", module, "-o", module]].concat())
 }
 
 /// Where the package and the playground lie.
@@ -167,6 +190,7 @@ fn test(pictures: Option<&Path>) -> Result<()> {
     let [program, package, playground] =
         [&program, &package, &playground].map(|path: &PathBuf| path.to_string_lossy());
     run_with("node", &[&format!("{FOLDER}/tests/node.mjs")], &[("LUMBRE", &program), ("PACKAGE", &package)])?;
+    run_with("node", &[&format!("{FOLDER}/tests/shell.mjs")], &[("PACKAGE", &package)])?;
     let Some(browser) = crate::page::browser() else {
         eprintln!("\nThe playground is not tried: it needs Chromium (Debian: apt-get install chromium)");
         return Ok(());
@@ -179,4 +203,16 @@ fn test(pictures: Option<&Path>) -> Result<()> {
         words.extend(["--pictures", pictures]);
     }
     run_with("node", &words, &[("LUMBRE", &program), ("CHROMIUM", &browser), ("PLAYGROUND", &playground)])
+}
+
+/// Tries the live parts of a built book, as far as there is what that needs.
+pub(crate) fn test_book(html: &Path, program: &Path) -> Result<()> {
+    let is_installed = root().join(FOLDER).join("node_modules/playwright-core").is_dir();
+    let (true, Some(browser)) = (is_installed, crate::page::browser()) else {
+        eprintln!("\nThe live parts of the book are not tried: they need cargo xtask web, and Chromium");
+        return Ok(());
+    };
+    let [browser, html, program] = [&browser, html, program].map(Path::to_string_lossy);
+    let environment = [("LUMBRE", &*program), ("CHROMIUM", &*browser), ("BOOK", &*html)];
+    run_with("node", &[&format!("{FOLDER}/tests/book.mjs")], &environment)
 }

@@ -23,20 +23,20 @@ use crate::units::{self, counted};
 #[derive(Args)]
 #[command(next_help_heading = "Parts and checkpoints")]
 pub(crate) struct PartArguments {
-    /// Render only samples A to B-1 of every pixel. lumbre merge joins such parts into exactly the picture of one run. A part is an .exr,
-    /// whose picture other programs show, or a .part.
+    /// Render only samples A to B-1 of every pixel. lumbre merge joins such parts into exactly the picture of one run.
+    /// A part is an .exr, whose picture other programs show, or a .part.
     #[arg(long, value_name = "A..B", value_parser = samples, conflicts_with_all = ["time", "noise", "min_spp", "denoise", "turntable"])]
     samples: Option<Range<u32>>,
-    /// Save the samples in this file during the render, so that --resume can continue. By default a render of more than two minutes saves
-    /// them in OUT.checkpoint until it is done.
+    /// Save the samples in this file during the render, so that --resume can continue. By default a render of more than
+    /// two minutes saves them in OUT.checkpoint until it is done.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["frames", "turntable"])]
     checkpoint: Option<PathBuf>,
     /// The time between two checkpoints.
     #[arg(long, value_name = "DUR", value_parser = units::duration, default_value = "30s")]
     checkpoint_every: Duration,
-    /// Continue from a checkpoint, with the same result as an uninterrupted run. Or continue from the picture, if it was saved with
-    /// --keep-sums. A higher --spp adds samples. If neither exists, start from the beginning. Pictures of --frames and --turntable that are
-    /// finished (.png, .exr) are not rendered again.
+    /// Continue from a checkpoint, with the same result as an uninterrupted run. Or continue from the picture, if it
+    /// was saved with --keep-sums. A higher --spp adds samples. If neither exists, start from the beginning. Pictures
+    /// of --frames and --turntable that are finished (.png, .exr) are not rendered again.
     #[arg(long)]
     resume: bool,
     /// Save no checkpoint, however long the render takes.
@@ -264,8 +264,8 @@ impl Lock {
         }
     }
 
-    /// The lock of this name; `None` where another run holds it. Windows opens the file for one run alone, and removes it when that run ends,
-    /// however it does.
+    /// The lock of this name; `None` where another run holds it. Windows opens the file for one run alone, and removes
+    /// it when that run ends, however it does.
     #[cfg(windows)]
     fn held(path: &Path) -> io::Result<Option<Self>> {
         use std::os::windows::fs::OpenOptionsExt;
@@ -349,7 +349,8 @@ fn with_ending(path: &Path, ending: &str) -> PathBuf {
 }
 
 impl Checkpoint {
-    /// Begins a render into `output`, which goes on from the state that is given, if any. `job` is found out on a thread of its own.
+    /// Begins a render into `output`, which goes on from the state that is given, if any. `job` is found out on a
+    /// thread of its own.
     ///
     /// # Errors
     /// [`Failure`] where what there is to go on from is of another render, is damaged, or is in use.
@@ -477,8 +478,8 @@ impl Checkpoint {
         self.path.is_some().then_some(self.every)
     }
 
-    /// Keeps a state while the render goes on: it is written by a thread of its own. A state that comes while another is written is
-    /// left out.
+    /// Keeps a state while the render goes on: it is written by a thread of its own. A state that comes while another
+    /// is written is left out.
     pub(crate) fn keep(&self, state: RenderState) {
         let is_due = self.is_asked || (self.start.elapsed() >= LONG && state.taken() > self.others);
         let (true, Some(path)) = (is_due, self.path.clone()) else { return };
@@ -504,7 +505,8 @@ impl Checkpoint {
         self.path.is_some()
     }
 
-    /// Ends with the last state: an unfinished render keeps it if it was long or resumed, a finished one only where a checkpoint was asked for.
+    /// Ends with the last state: an unfinished render keeps it if it was long or resumed, a finished one only where a
+    /// checkpoint was asked for.
     ///
     /// # Errors
     /// [`Failure::Io`] where the checkpoint cannot be written.

@@ -17,8 +17,8 @@ pub(crate) fn has_colours(stream: &impl IsTerminal) -> bool {
     colours(|name| std::env::var_os(name), stream.is_terminal() && understands_ansi())
 }
 
-/// Whether the terminal takes escape sequences. Consoles of Windows do from Windows 10 on, once they are asked to; the terminals of
-/// MSYS, which are no consoles, set `TERM`.
+/// Whether the terminal takes escape sequences. Consoles of Windows do from Windows 10 on, once they are asked to; the
+/// terminals of MSYS, which are no consoles, set `TERM`.
 pub(crate) fn understands_ansi() -> bool {
     !cfg!(windows)
         || std::env::var_os("TERM").is_some_and(|name| !name.is_empty())

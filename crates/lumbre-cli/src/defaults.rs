@@ -1,4 +1,5 @@
-//! How the picture of a staged scene is made and shown where nobody says otherwise: for the program, and for other front ends.
+//! How the picture of a staged scene is made and shown where nobody says otherwise: for the program, and for other
+//! front ends.
 
 use lumbre::description::IntegratorKind;
 use lumbre::image::ToneMap;
@@ -16,8 +17,8 @@ pub struct Defaults {
 }
 
 impl Defaults {
-    /// Sets a description on the stage that nobody has asked to be otherwise, for a picture of this size. `integrator` is the one in place
-    /// of the description's own.
+    /// Sets a description on the stage that nobody has asked to be otherwise, for a picture of this size. `integrator`
+    /// is the one in place of the description's own.
     pub fn stage(desc: &mut SceneDesc, size: Option<(u32, u32)>, integrator: Option<IntegratorKind>) -> Self {
         let mut stage = Stage::default();
         stage.size = size;
@@ -52,13 +53,14 @@ impl Defaults {
         self.staged.grounded
     }
 
-    /// What is behind the picture, which then is rendered without its background: the paper of a studio. `None` for what the scene has.
+    /// What is behind the picture, which then is rendered without its background: the paper of a studio. `None` for
+    /// what the scene has.
     pub fn background(&self) -> Option<Background> {
         (self.is_of_light && self.staged.light == StageLight::Studio).then(Background::studio)
     }
 
-    /// Whether the noise is taken out of its picture, where nobody says otherwise: in the light of the studio, and of a model without a camera
-    /// in that of an environment map.
+    /// Whether the noise is taken out of its picture, where nobody says otherwise: in the light of the studio, and of a
+    /// model without a camera in that of an environment map.
     pub fn denoises(&self) -> bool {
         let is_staged = match self.staged.light {
             StageLight::Studio => true,
@@ -68,8 +70,8 @@ impl Defaults {
         is_staged && self.is_of_light
     }
 
-    /// Samples per pixel of a picture whose noise is taken out, where neither the caller nor the file says how many: 16 where
-    /// [`Defaults::denoises`] holds.
+    /// Samples per pixel of a picture whose noise is taken out, where neither the caller nor the file says how many: 16
+    /// where [`Defaults::denoises`] holds.
     pub fn spp(&self, scene: &Scene) -> Option<u32> {
         (self.denoises() && scene.resolved().sampler().spp.is_none()).then_some(MODEL_SPP)
     }

@@ -33,8 +33,8 @@ pub(crate) struct Arguments {
     /// The picture to compare it with; relmse and flip take it as the reference.
     b: PathBuf,
     /// How to measure: rmse (root mean square), relmse (squares relative to the reference's), mae (mean of absolute
-    /// values), max (the largest), flip (what a person notices when the two alternate, 0 to 1), or ssim (structural similarity,
-    /// 1 for equal pictures).
+    /// values), max (the largest), flip (what a person notices when the two alternate, 0 to 1), or ssim (structural
+    /// similarity, 1 for equal pictures).
     #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = one_of(&METRICS, Metric::from_name))]
     metric: Metric,
     /// Compare this part only: its left and top edge, its width and its height in pixels.

@@ -65,8 +65,8 @@ struct SlurmArguments {
     /// The folder of scripts and parts. By default NAME.farm for NAME.pbrt.
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
-    /// Options of lumbre render, after --. Those that the tasks set themselves (--samples, -o), and those that parts cannot have (--time,
-    /// --noise, --denoise), are refused.
+    /// Options of lumbre render, after --. Those that the tasks set themselves (--samples, -o), and those that parts
+    /// cannot have (--time, --noise, --denoise), are refused.
     #[arg(last = true, value_name = "RENDER OPTIONS")]
     render: Vec<String>,
 }
@@ -215,8 +215,8 @@ fn refuse_others(output: &Path, frames: Option<&Frames>) -> Result<(), Failure> 
     }
 }
 
-/// A folder as Slurm reads it in the pattern of a log's name, where % begins the number of a job, and %% is %. Behind a backslash it
-/// replaces nothing, so that all tasks would have one log.
+/// A folder as Slurm reads it in the pattern of a log's name, where % begins the number of a job, and %% is %. Behind a
+/// backslash it replaces nothing, so that all tasks would have one log.
 ///
 /// # Errors
 /// [`Failure::Usage`] for a name with a backslash.

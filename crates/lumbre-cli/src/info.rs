@@ -49,7 +49,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let (mut desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
     arguments.reading.check_build(&desc, &diagnostics)?;
-    // What is in the file, before it is set on a stage: a model without a camera is measured as `lumbre render` shows it.
+    // What is in the file, before it is set on a stage: a model without a camera is measured as `lumbre render` shows
+    // it.
     let mut info = SceneInfo::of(&desc);
     let defaults = Defaults::stage(&mut desc, None, None);
     let scene = Scene::of_file(desc, &arguments.scene[0], &mut diagnostics)?;

@@ -44,7 +44,8 @@ pub(crate) mod tests {
 
     use super::filled;
 
-    /// That two tables have no empty sentence, the same places to be filled in, and nothing in common but `shared`, in this order.
+    /// That two tables have no empty sentence, the same places to be filled in, and nothing in common but `shared`, in
+    /// this order.
     pub(crate) fn assert_translated(english: &impl Debug, spanish: &impl Debug, shared: &[&str]) {
         let (english, spanish) = (format!("{english:#?}"), format!("{spanish:#?}"));
         let (english, spanish) = (sentences(&english), sentences(&spanish));

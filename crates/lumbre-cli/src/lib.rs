@@ -172,7 +172,8 @@ fn without_turntable(command: clap::Command) -> clap::Command {
     command.mut_arg("turntable", |option| option.hide(true))
 }
 
-/// Runs the program with these arguments, the first being its name, and returns its exit status. Signals end the process.
+/// Runs the program with these arguments, the first being its name, and returns its exit status. Signals end the
+/// process.
 #[cfg(not(target_family = "wasm"))]
 pub fn run(words: Vec<OsString>) -> u8 {
     let words = verb::with_render(words, &Arguments::command());

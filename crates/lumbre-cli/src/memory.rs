@@ -33,8 +33,8 @@ enum Bound {
 const RESERVE: u64 = 64 << 20;
 
 impl Memory {
-    /// As much as `--max-memory` lets it take, or by default what is free, in the machine and in its control groups; but no more than
-    /// the system grants (`ulimit -v`).
+    /// As much as `--max-memory` lets it take, or by default what is free, in the machine and in its control groups;
+    /// but no more than the system grants (`ulimit -v`).
     pub(crate) fn new(flag: Option<u64>) -> Self {
         let memory = match flag {
             Some(most) => Self { most, bound: Bound::Flag },
@@ -78,8 +78,8 @@ impl Memory {
         }
     }
 
-    /// The failure of a reader, with what else there is to know of the limit on memory where it met that, and what the system grants is
-    /// what set it.
+    /// The failure of a reader, with what else there is to know of the limit on memory where it met that, and what the
+    /// system grants is what set it.
     pub(crate) fn explain(self, error: lumbre::Error) -> Failure {
         let is_of_memory = match &error {
             lumbre::Error::Format(FormatError::Limit { source, .. }) => source.kind == LimitKind::Memory,
@@ -151,7 +151,8 @@ pub fn memory_left() -> u64 {
     if memory.bound == Bound::AddressSpace { memory.usable() } else { memory.most }
 }
 
-/// Refuses a picture that would not fit into the memory that is free, while it is rendered, saved or shown. `held` bytes are held already.
+/// Refuses a picture that would not fit into the memory that is free, while it is rendered, saved or shown. `held`
+/// bytes are held already.
 ///
 /// # Errors
 /// [`Failure::Limit`] with the prediction, and [`Failure::Usage`] for options that make no picture.
@@ -170,8 +171,8 @@ fn available_memory() -> Option<u64> {
     Some(kibibytes("MemAvailable:")?.saturating_add(swap).saturating_mul(1024))
 }
 
-/// Bytes that are left in the control groups of the process and in those around them; `None` if none has a limit. `root` is the
-/// folder of the system's files.
+/// Bytes that are left in the control groups of the process and in those around them; `None` if none has a limit.
+/// `root` is the folder of the system's files.
 fn group_memory_left(root: &Path) -> Option<u64> {
     let groups = fs::read_to_string(root.join("proc/self/cgroup")).ok()?;
     let left = groups.lines().flat_map(|line| {

@@ -35,8 +35,8 @@ pub(crate) struct Arguments {
     /// The parts: .part files, and .exr files of --samples or --keep-sums.
     #[arg(required = true, value_name = "PART")]
     parts: Vec<PathBuf>,
-    /// The picture (.exr, .png, .jpg, .webp, .qoi, .hdr or .pfm), or a .part. A # in the name is replaced by the frame number: one picture
-    /// per frame.
+    /// The picture (.exr, .png, .jpg, .webp, .qoi, .hdr or .pfm), or a .part. A # in the name is replaced by the frame
+    /// number: one picture per frame.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Join the parts even if samples are missing, and print which.
@@ -51,7 +51,8 @@ pub(crate) struct Arguments {
     /// Tone mapping, for .png and .jpg. Overrides the one stored in the parts. Required if they differ.
     #[arg(long, value_name = "NAME", value_parser = one_of(&ToneMap::NAMES, ToneMap::from_name))]
     tonemap: Option<ToneMap>,
-    /// The background image of parts that were rendered with --background FILE. Give it here: merge never opens a file named only inside a part.
+    /// The background image of parts that were rendered with --background FILE. Give it here: merge never opens a file
+    /// named only inside a part.
     #[arg(long, value_name = "FILE")]
     background: Option<PathBuf>,
     /// Memory limit for a part. By default 64 MiB plus 32 bytes per byte of the file.
@@ -250,8 +251,8 @@ fn save(arguments: &Arguments, whole: &Part, output: &Path) -> Result<(), Failur
     Ok(picture.save_with(output, &options, &layers)?)
 }
 
-/// The background that a part's picture is shown over. A part may come from anyone: an image is opened by the name that the user gives, never
-/// by that in the part.
+/// The background that a part's picture is shown over. A part may come from anyone: an image is opened by the name that
+/// the user gives, never by that in the part.
 fn background(name: &str, given: Option<&Path>) -> Result<Option<Background>, Failure> {
     match (name.strip_prefix("file "), given) {
         (Some(_), Some(path)) => {

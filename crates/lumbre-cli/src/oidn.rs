@@ -41,9 +41,10 @@ macro_rules! functions {
 
         impl Api {
             fn load(path: &Path) -> Result<Self, libloading::Error> {
-                // SAFETY: a file of this name is Open Image Denoise, in a place where the user or the system keeps libraries; its
-                // initialisers are those of an ordinary library. The symbols have the types that version 2 documents: the name of
-                // `oidnSetFilterBool` is of that version, so that another one is not taken for it.
+                // SAFETY: a file of this name is Open Image Denoise, in a place where the user or the system keeps
+                // libraries; its initialisers are those of an ordinary library. The symbols have the types that version
+                // 2 documents: the name of `oidnSetFilterBool` is of that version, so that another one is not taken for
+                // it.
                 unsafe {
                     let library = Library::new(path)?;
                     Ok(Self {
@@ -218,8 +219,8 @@ impl<'a> Device<'a> {
         if images.iter().any(|(_, numbers)| numbers.len() != 3 * width * height) {
             return Err("the pictures are of different sizes".to_owned());
         }
-        // SAFETY: the device is live; names end with a zero; each image has three numbers for each of `width * height` pixels, packed
-        // row by row, which the strides of 0 mean, and lives until the filter is released.
+        // SAFETY: the device is live; names end with a zero; each image has three numbers for each of `width * height`
+        // pixels, packed row by row, which the strides of 0 mean, and lives until the filter is released.
         unsafe {
             let filter = (self.api.new_filter)(self.handle, c"RT".as_ptr());
             if filter.is_null() {

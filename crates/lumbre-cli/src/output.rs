@@ -25,7 +25,8 @@ enum Identity {
 }
 
 impl Identity {
-    /// That of a regular file, or of a name that is free; `None` for folders, devices and pipes, in which nothing is replaced.
+    /// That of a regular file, or of a name that is free; `None` for folders, devices and pipes, in which nothing is
+    /// replaced.
     fn of(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
             Ok(meta) if !meta.is_file() => None,
@@ -151,9 +152,10 @@ pub(crate) fn refuse_inputs(
     Ok(())
 }
 
-/// The name of pictures for which none is given, or with `#` for their number the pattern of their names: that of the scene's
-/// film, or else of the scene's file, with the ending next to it. Where that is the name of a file that was read, or of one that Lumbre did not write, it is
-/// `STEM.render.png`; the format is the same, but for PFM, which cannot say who wrote it: EXR holds the same numbers.
+/// The name of pictures for which none is given, or with `#` for their number the pattern of their names: that of the
+/// scene's film, or else of the scene's file, with the ending next to it. Where that is the name of a file that was
+/// read, or of one that Lumbre did not write, it is `STEM.render.png`; the format is the same, but for PFM, which
+/// cannot say who wrote it: EXR holds the same numbers.
 ///
 /// # Errors
 /// [`Failure::Usage`] when that name is not free either.

@@ -11,7 +11,8 @@ use crate::failure::Failure;
 /// The commands that take switches of POV-Ray.
 const COMMANDS: [&str; 3] = ["render", "view", "info"];
 
-/// The words with options of ours in place of POV-Ray's switches and files of settings, where a scene of POV-Ray is rendered.
+/// The words with options of ours in place of POV-Ray's switches and files of settings, where a scene of POV-Ray is
+/// rendered.
 ///
 /// # Errors
 /// [`Failure`] if a file of settings cannot be read, or if a switch has a wrong value.

@@ -139,7 +139,8 @@ pub(crate) enum Display {
 const STEPS: u64 = 1000;
 /// The least interval between lines.
 const INTERVAL: Duration = Duration::from_secs(2);
-/// The interval between lines of words, as a share of the time since the first: 240 lines in 8 minutes would hide all others.
+/// The interval between lines of words, as a share of the time since the first: 240 lines in 8 minutes would hide all
+/// others.
 const INTERVAL_SHARE: f64 = 0.1;
 /// The share that has to be done before the time left is told: less says little about the rest.
 const MIN_SHARE: f64 = 0.01;

@@ -30,8 +30,8 @@ pub(crate) struct ReadingArguments {
     /// The time in seconds at which the animations of a glTF are evaluated.
     #[arg(long, value_name = "T", value_parser = seconds, help_heading = "Animation")]
     frame: Option<f64>,
-    /// How long the shutter is open about the time of a glTF's frame, as a fraction of the frame interval (see --fps): 0,
-    /// the default, is an instant; 0.5 is usual in film. Animated objects get motion blur.
+    /// How long the shutter is open about the time of a glTF's frame, as a fraction of the frame interval (see --fps):
+    /// 0, the default, is an instant; 0.5 is usual in film. Animated objects get motion blur.
     #[arg(long, value_name = "S", value_parser = shutter, help_heading = "Animation")]
     shutter: Option<f64>,
     /// Frames per second, for --frames, --shutter, and a .gif or a video.
@@ -44,8 +44,8 @@ pub(crate) struct ReadingArguments {
     /// The material variant of a glTF.
     #[arg(long, value_name = "NAME")]
     variant: Option<String>,
-    /// A folder of files that a POV-Ray scene includes, besides its own folder and where Debian has POV-Ray's own. May be repeated; the
-    /// first folder is searched first.
+    /// A folder of files that a POV-Ray scene includes, besides its own folder and where Debian has POV-Ray's own. May
+    /// be repeated; the first folder is searched first.
     #[arg(long, value_name = "DIR")]
     pov_include: Vec<PathBuf>,
     /// The clock value of a POV-Ray scene, or A..B for the first and the last frame of --frames.
@@ -64,8 +64,8 @@ pub(crate) struct ReadingArguments {
     /// The size of the picture, which POV-Ray scenes ask for.
     #[arg(skip)]
     picture_size: Option<(u32, u32)>,
-    /// Set a parameter of the scene: material.NAME.PARAM, light.INDEX.PARAM, light.area.scale, camera.PARAM or film.PARAM. For a
-    /// wrong name, the error lists the valid ones.
+    /// Set a parameter of the scene: material.NAME.PARAM, light.INDEX.PARAM, light.area.scale, camera.PARAM or
+    /// film.PARAM. For a wrong name, the error lists the valid ones.
     #[arg(short = 'D', long = "define", value_name = "PATH=VALUE", help_heading = "Parameters", value_parser = Setting::from_str)]
     settings: Vec<Setting>,
     /// A file of such settings, one per line; # begins a comment line.
@@ -272,8 +272,8 @@ impl ReadingArguments {
         self.describe_at(paths, Some(f64::from(number) / self.fps), Some(number))
     }
 
-    /// [`Self::describe`] at another moment, and with another variant, where they are given. A scene that came with a folder may use no files
-    /// but those in it: see [`lumbre::ReadOptions::folder`].
+    /// [`Self::describe`] at another moment, and with another variant, where they are given. A scene that came with a
+    /// folder may use no files but those in it: see [`lumbre::ReadOptions::folder`].
     ///
     /// # Errors
     /// As for [`ReadingArguments::open`].

@@ -74,43 +74,45 @@ Animations of a glTF, at a time in seconds, or frame by frame with motion blur:
 
 Ctrl-C stops and saves what is there, if every pixel has a sample; a second one stops at once and saves nothing.")]
 pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip; - is standard input. Several .pbrt files are read
-    /// one after another; files of other formats are put into the same world.
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip; - is standard input. Several
+    /// .pbrt files are read one after another; files of other formats are put into the same world.
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
-    /// The picture: .exr, .png, .jpg, .webp, .qoi, .hdr or .pfm; - is standard output. Several are one file that ends in .gif, .mp4, .webm,
-    /// .mkv or .mov. By default the film's name in the scene, else NAME.png. If that file is an input, or not written by Lumbre:
-    /// NAME.render.png.
+    /// The picture: .exr, .png, .jpg, .webp, .qoi, .hdr or .pfm; - is standard output. Several are one file that ends
+    /// in .gif, .mp4, .webm, .mkv or .mov. By default the film's name in the scene, else NAME.png. If that file is an
+    /// input, or not written by Lumbre: NAME.render.png.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
     /// The format of a picture on standard output: png by default.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(&WRITTEN, written_format))]
     output_format: Option<ImageFormat>,
-    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised; 4 for a scene of POV-Ray, and
-    /// 16 at edges.
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised; 4 for a scene
+    /// of POV-Ray, and 16 at edges.
     #[arg(long, value_name = "N", value_parser = units::whole(1..=u32::MAX))]
     spp: Option<u32>,
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
     #[arg(long, value_name = "DUR", value_parser = units::duration)]
     time: Option<Duration>,
-    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02. The render ends at --spp or --time at the
-    /// latest. Without either it runs until every pixel reaches the target. The progress shows the time left, and Ctrl-C saves the picture.
+    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02. The render ends
+    /// at --spp or --time at the latest. Without either it runs until every pixel reaches the target. The progress
+    /// shows the time left, and Ctrl-C saves the picture.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
-    /// With --noise: at least this many samples per pixel. By default 16, or up to 256 where most of the light comes from rare samples.
+    /// With --noise: at least this many samples per pixel. By default 16, or up to 256 where most of the light comes
+    /// from rare samples.
     #[arg(long, value_name = "N", requires = "noise", value_parser = units::whole(1..=u32::MAX))]
     min_spp: Option<u32>,
-    /// Denoise the picture. With Lumbre's own filter (own, or auto, which is the same), or with Open Image Denoise if it is installed (oidn;
-    /// the variable OIDN_DIR names its folder). An .exr keeps the noisy picture too, in noisy.R, noisy.G and noisy.B. By default own in
-    /// the light of the studio, else none.
+    /// Denoise the picture. With Lumbre's own filter (own, or auto, which is the same), or with Open Image Denoise if
+    /// it is installed (oidn; the variable OIDN_DIR names its folder). An .exr keeps the noisy picture too, in noisy.R,
+    /// noisy.G and noisy.B. By default own in the light of the studio, else none.
     #[arg(long, value_name = "WITH", num_args = 0..=1, default_missing_value = "auto",
           value_parser = one_of(&Choice::NAMES, Choice::from_name))]
     denoise: Option<Choice>,
     /// Width and height in pixels.
     #[arg(long, value_name = "WxH", value_parser = units::size)]
     size: Option<(u32, u32)>,
-    /// Frames of an animation from A to B, both included, as -o frame.####.png, or in one file, as -o walk.gif or walk.mp4 (by ffmpeg).
-    /// Frame n shows the time n / --fps.
+    /// Frames of an animation from A to B, both included, as -o frame.####.png, or in one file, as -o walk.gif or
+    /// walk.mp4 (by ffmpeg). Frame n shows the time n / --fps.
     #[arg(long, value_name = "A..B", conflicts_with_all = ["frame", "turntable"], help_heading = "Animation")]
     frames: Option<Frames>,
     /// Render only this rectangle, in pixels or in fractions of the picture.
@@ -125,12 +127,13 @@ pub(crate) struct Arguments {
     /// The maximum number of bounces.
     #[arg(long, value_name = "N", value_parser = units::whole(0..=u32::MAX))]
     max_depth: Option<u32>,
-    /// How shading normals are treated: lumbre keeps coarse meshes free of black edges and leaks, pbrt does as pbrt-v4. By default what
-    /// the scene says, else lumbre.
+    /// How shading normals are treated: lumbre keeps coarse meshes free of black edges and leaks, pbrt does as pbrt-v4.
+    /// By default what the scene says, else lumbre.
     #[arg(long, value_name = "HOW", value_parser = one_of(&SHADING_NORMALS, ShadingNormals::from_name))]
     shading_normals: Option<ShadingNormals>,
-    /// Carry three wavelengths along each path in place of red, green and blue. Colours that multiply many times, spectra of lights and
-    /// glass that disperses are then right. Only with the integrator path. By default if the scene's film is spectral.
+    /// Carry three wavelengths along each path in place of red, green and blue. Colours that multiply many times,
+    /// spectra of lights and glass that disperses are then right. Only with the integrator path. By default if the
+    /// scene's film is spectral.
     #[arg(long)]
     spectral: bool,
     /// Seed of the random numbers.
@@ -149,8 +152,8 @@ pub(crate) struct Arguments {
     /// AOVs as layers of an .exr, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = one_of(&Feature::NAMES, Feature::from_name))]
     aov: Vec<Feature>,
-    /// Which metadata .exr and .png contain. Plain: what the pixels depend on (version, a hash of the scene and the options, seed, samples,
-    /// camera), the same for every run. Full: also the command and its time.
+    /// Which metadata .exr and .png contain. Plain: what the pixels depend on (version, a hash of the scene and the
+    /// options, seed, samples, camera), the same for every run. Full: also the command and its time.
     #[arg(long, value_enum, value_name = "WHICH", default_value_t = Metadata::Plain)]
     metadata: Metadata,
     /// Write statistics of the render, as JSON.

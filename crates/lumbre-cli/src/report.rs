@@ -91,7 +91,8 @@ fn missed(stats: &Stats, stop: &Stop) -> Option<String> {
     (noisy > 0).then(|| format!("{} {are} above {target}{more}", counted(noisy, "pixel")))
 }
 
-/// The share of light from lamps that the integrator of a scene, if it is `path`, hardly finds; `None` where that is little.
+/// The share of light from lamps that the integrator of a scene, if it is `path`, hardly finds; `None` where that is
+/// little.
 pub(crate) fn caustics_not_found(scene: &Scene, options: &RenderOptions) -> Option<f64> {
     const MUCH: f64 = 0.003;
     let is_path = matches!(options.integrator.kind, IntegratorKind::Path { .. });

@@ -1,4 +1,5 @@
-//! What `-h` says: of each command the options that matter most, each in a sentence. `--help` has them all, with every word.
+//! What `-h` says: of each command the options that matter most, each in a sentence. `--help` has them all, with every
+//! word.
 
 use clap::{Arg, Command};
 

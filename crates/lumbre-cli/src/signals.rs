@@ -41,9 +41,9 @@ const INTERVAL: Duration = Duration::from_millis(10);
 /// The exit status of a limit.
 const LIMIT: i32 = 5;
 
-/// What asks the program to end, with its exit status, and whether a second one means that it cannot wait: shells send SIGHUP twice when
-/// a terminal is closed, schedulers SIGUSR1 as often as they like, and the system SIGXCPU every second once the time of the processor
-/// (`ulimit -t`) is over.
+/// What asks the program to end, with its exit status, and whether a second one means that it cannot wait: shells send
+/// SIGHUP twice when a terminal is closed, schedulers SIGUSR1 as often as they like, and the system SIGXCPU every
+/// second once the time of the processor (`ulimit -t`) is over.
 #[cfg(unix)]
 const SIGNALS: [(i32, u8, bool); 6] = [
     (SIGINT, 130, true),
@@ -67,8 +67,9 @@ fn wanted() -> impl Iterator<Item = (i32, u8, bool)> {
     })
 }
 
-/// SIGINT, SIGTERM and their like ([`SIGNALS`]), and a deadline. The first signal asks the work to end, and ends the program where that leaves nothing to save
-/// or takes too long; a second one ends it at once. The temporary files of writes are removed, and no path holds a part of a file.
+/// SIGINT, SIGTERM and their like ([`SIGNALS`]), and a deadline. The first signal asks the work to end, and ends the
+/// program where that leaves nothing to save or takes too long; a second one ends it at once. The temporary files of
+/// writes are removed, and no path holds a part of a file.
 pub(crate) struct Signals {
     last: Arc<AtomicUsize>,
     state: Arc<Mutex<State>>,
@@ -157,7 +158,8 @@ impl Signals {
     }
 }
 
-/// Has the signals of [`SIGNALS`] leave their exit status in `last`, set `came`, and `hurries` if a second one cannot wait.
+/// Has the signals of [`SIGNALS`] leave their exit status in `last`, set `came`, and `hurries` if a second one cannot
+/// wait.
 #[cfg(unix)]
 fn register(
     watches: bool,
@@ -181,9 +183,10 @@ fn register(
     Ok(())
 }
 
-/// The same for the events of a console of Windows, with the exit statuses of their like elsewhere: Ctrl-C, Ctrl-Break, and the ends of
-/// the console, the session and the machine. After the latter three Windows ends the process within seconds (five for a console), done
-/// or not. Without a watching thread nothing is registered, and any of them ends the program at once.
+/// The same for the events of a console of Windows, with the exit statuses of their like elsewhere: Ctrl-C, Ctrl-Break,
+/// and the ends of the console, the session and the machine. After the latter three Windows ends the process within
+/// seconds (five for a console), done or not. Without a watching thread nothing is registered, and any of them ends the
+/// program at once.
 #[cfg(windows)]
 fn register(
     watches: bool,
@@ -274,8 +277,8 @@ impl Watcher {
 }
 
 impl Signals {
-    /// Enters the phase of writing a file of this name. A pipe or a device is opened, and to be held until it is written: the phase
-    /// begins when someone reads.
+    /// Enters the phase of writing a file of this name. A pipe or a device is opened, and to be held until it is
+    /// written: the phase begins when someone reads.
     ///
     /// # Errors
     /// [`Failure::Io`] when a pipe or a device cannot be opened.

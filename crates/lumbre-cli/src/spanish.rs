@@ -1,4 +1,5 @@
-//! The help of `lumbre explain` and `lumbre math` in Spanish, and what is wrong with their words, where `--lang es` is among them.
+//! The help of `lumbre explain` and `lumbre math` in Spanish, and what is wrong with their words, where `--lang es` is
+//! among them.
 
 use std::error::Error as _;
 use std::ffi::OsString;

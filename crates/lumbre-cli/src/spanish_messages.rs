@@ -1,6 +1,8 @@
-//! What is wrong with a scene and with the options of its picture, in Spanish: a table of the sentences in which readers say it.
+//! What is wrong with a scene and with the options of its picture, in Spanish: a table of the sentences in which
+//! readers say it.
 //!
-//! Readers write `PLACE: SENTENCE (found X; expected Y; did you mean Z?)`. A sentence that is not in the table stays as it is.
+//! Readers write `PLACE: SENTENCE (found X; expected Y; did you mean Z?)`. A sentence that is not in the table stays as
+//! it is.
 
 /// Sentences in both languages. `{}` stands for what comes from the scene, in the same order in both.
 const SENTENCES: &[(&str, &str)] = &[

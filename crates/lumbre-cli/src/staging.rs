@@ -23,24 +23,25 @@ use crate::units;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Showing a model")]
 pub(crate) struct StagingArguments {
-    /// What the model stands on: none, shadow (ground of which only the shadow is seen) or plane (matte grey). By default a
-    /// shadow where both camera and light are automatic.
+    /// What the model stands on: none, shadow (ground of which only the shadow is seen) or plane (matte grey). By
+    /// default a shadow where both camera and light are automatic.
     #[arg(long, value_name = "WHAT", value_parser = one_of(&Ground::NAMES, Ground::from_name))]
     ground: Option<Ground>,
-    /// Light from all around: a picture (.hdr, .exr, …), studio, sky:TIME,LATITUDE,LONGITUDE or none. A picture is twice as wide as high, or
-    /// square in pbrt's equal-area mapping; a sky is the sun and a clear sky there and then (sky:2026-06-21T12:00+02:00,40.4,-3.7), with
-    /// north behind the model; with none the file's own lights are all. By default studio for what brings no light, and for a glTF without
-    /// a camera.
+    /// Light from all around: a picture (.hdr, .exr, …), studio, sky:TIME,LATITUDE,LONGITUDE or none. A picture is
+    /// twice as wide as high, or square in pbrt's equal-area mapping; a sky is the sun and a clear sky there and then
+    /// (sky:2026-06-21T12:00+02:00,40.4,-3.7), with north behind the model; with none the file's own lights are all. By
+    /// default studio for what brings no light, and for a glTF without a camera.
     #[arg(long, value_name = "FILE|studio|sky:TIME,LATITUDE,LONGITUDE|none", value_parser = OsStringValueParser::new().try_map(|text| around(&text)))]
     env: Option<AroundArgument>,
-    /// What is behind everything: env (the light from there), studio (grey paper), transparent, a colour (white, "#e8e0d8") or
-    /// an image file. By default studio where the light is automatic, else env.
+    /// What is behind everything: env (the light from there), studio (grey paper), transparent, a colour (white,
+    /// "#e8e0d8") or an image file. By default studio where the light is automatic, else env.
     #[arg(long, value_name = "WHAT", value_parser = background)]
     background: Option<BackgroundArgument>,
     /// Frame the whole model even if the file has a camera.
     #[arg(long, conflicts_with = "camera", help_heading = "View")]
     fit: bool,
-    /// Render N pictures from all around the model, as -o frame.####.png, or into one file, as -o turn.gif or turn.mp4 (by ffmpeg).
+    /// Render N pictures from all around the model, as -o frame.####.png, or into one file, as -o turn.gif or turn.mp4
+    /// (by ffmpeg).
     #[arg(long, value_name = "N", value_parser = units::whole(2_u32..=100_000),
           conflicts_with = "camera", help_heading = "View")]
     turntable: Option<u32>,

@@ -8,8 +8,8 @@ use crate::memory::address_space_left;
 const ADDRESS_SPACE: u64 = 72 << 20;
 
 /// Starts one per core, or as many as the system grants: at the limit of a user's processes (`ulimit -u`) it refuses
-/// them. Without any the calling thread does the work. Where it limits the address space (`ulimit -v`), they take no more than
-/// a quarter of it, and the same number to render.
+/// them. Without any the calling thread does the work. Where it limits the address space (`ulimit -v`), they take no
+/// more than a quarter of it, and the same number to render.
 pub(crate) fn start() {
     let cores = cores();
     let fit = address_space_left().map_or(cores, |left| (left / (4 * ADDRESS_SPACE)) as usize);

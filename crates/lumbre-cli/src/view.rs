@@ -7,8 +7,8 @@ use lumbre::{DVec3, Scene, Stage, UpAxis, Viewpoint};
 
 use crate::failure::Failure;
 
-/// Where a picture is taken from. Without a camera in the file, or with any of the options that move it, a camera is made that
-/// has everything in its picture.
+/// Where a picture is taken from. Without a camera in the file, or with any of the options that move it, a camera is
+/// made that has everything in its picture.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "View")]
 pub(crate) struct ViewArguments {

@@ -38,33 +38,38 @@ use crate::view::ViewArguments;
 On another machine: with the same port at both ends, then open the address that is printed.
   ssh -L 8765:127.0.0.1:8765 HOST lumbre view --no-open --port 8765 scene.pbrt")]
 pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip. Several are put into the same world.
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip. Several are put into the
+    /// same world.
     #[arg(value_name = "SCENE")]
     scene: Vec<PathBuf>,
     /// The port. By default a free one.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = units::whole(0..=u16::MAX))]
     port: u16,
-    /// The address to listen at. Any other address than 127.0.0.1 exposes the page, unencrypted, to the network: prefer an ssh tunnel.
+    /// The address to listen at. Any other address than 127.0.0.1 exposes the page, unencrypted, to the network: prefer
+    /// an ssh tunnel.
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,
-    /// Another name under which browsers reach the page, such as localhost:9000 for a tunnel that begins at another port.
+    /// Another name under which browsers reach the page, such as localhost:9000 for a tunnel that begins at another
+    /// port.
     #[arg(long, value_name = "NAME:PORT", value_parser = name_and_port)]
     allow_host: Vec<String>,
-    /// Print N more addresses (1 without a number), each for one more browser, which shows what the first one does but cannot edit.
+    /// Print N more addresses (1 without a number), each for one more browser, which shows what the first one does but
+    /// cannot edit.
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1", require_equals = true,
           value_parser = units::whole(1_u8..=32))]
     share: Option<u8>,
     /// Only print the address.
     #[arg(long)]
     no_open: bool,
-    /// Write a page of the finished picture into this folder instead, with its channels, pixel values and facts of the scene. The page
-    /// opens from a file, and can be sent or put on a web server.
+    /// Write a page of the finished picture into this folder instead, with its channels, pixel values and facts of the
+    /// scene. The page opens from a file, and can be sent or put on a web server.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "allow_host", "no_open", "share"])]
     export: Option<PathBuf>,
     /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised.
     #[arg(long, value_name = "N", value_parser = units::whole(1..=u32::MAX))]
     spp: Option<u32>,
-    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02, as render does. The page can change it.
+    /// Stop sampling a pixel when its noise is below this share of its luminance, such as 0.02, as render does. The
+    /// page can change it.
     #[arg(long, value_name = "R", value_parser = noise)]
     noise: Option<f64>,
     /// With --noise: at least this many samples per pixel.
@@ -173,7 +178,8 @@ pub(crate) fn run(arguments: Arguments) -> Result<(), Failure> {
     }
 }
 
-/// Where the session of a port that was asked for is kept until the user logs out; nowhere on systems without such a folder.
+/// Where the session of a port that was asked for is kept until the user logs out; nowhere on systems without such a
+/// folder.
 fn session_file(port: u16) -> Option<PathBuf> {
     let folder = std::env::var_os("XDG_RUNTIME_DIR").filter(|folder| !folder.is_empty() && port != 0)?;
     let folder = Path::new(&folder);

@@ -142,7 +142,8 @@ fn glass_tells_its_refraction_and_shadows_what_is_in_their_way() {
         list(quantity(mirror, name)).iter().map(|x| x.as_f64().unwrap()).collect()
     };
     let (normal, refracted) = (vector("Nᵢ"), vector("Dₜ"));
-    // Snell: the sines of both angles are as 1.5 to 1. The ball's normal is a quarter over a half off the axis: a sine of 1/2.
+    // Snell: the sines of both angles are as 1.5 to 1. The ball's normal is a quarter over a half off the axis: a sine
+    // of 1/2.
     let cosine: f64 = -normal.iter().zip(&refracted).map(|(n, t)| n * t).sum::<f64>();
     assert!(((1.0 - cosine * cosine).sqrt() - 0.5 / 1.5).abs() < 1e-6, "{cosine}");
     // The rays that follow are explained too.
@@ -658,7 +659,8 @@ fn a_symbol_has_one_meaning_on_a_page_and_is_defined_before_it_is_used() {
                 let elsewhere = page.iter().find(|(other, ..)| other == symbol && !is_shared);
                 assert!(elsewhere.is_none(), "{symbol} is {label} {formula} and {elsewhere:?}: {context}");
             }
-            // A capsule is three shapes, and a plane cuts each end of a cone. On a patch, u is that of a ruling, then that of a crossing.
+            // A capsule is three shapes, and a plane cuts each end of a cone. On a patch, u is that of a ruling, then
+            // that of a crossing.
             if ["capsule", "csg", "bilinear"].iter().any(|kind| shapes.contains(kind)) {
                 continue;
             }

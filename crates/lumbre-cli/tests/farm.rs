@@ -10,7 +10,8 @@ use std::process::Command;
 use crate::files::{Folder, answer};
 use crate::parts::{bytes, done, folder, refused, signal, until_there};
 
-/// A scheduler that runs at once what it is given: the tasks of an array from the last to the first, the first of them twice.
+/// A scheduler that runs at once what it is given: the tasks of an array from the last to the first, the first of them
+/// twice.
 const SBATCH: &str = r#"#!/bin/sh
 set -eu
 for script; do :; done

@@ -1,4 +1,5 @@
-//! Disks that fail: whatever call does not work, every file is the old one or the new one, and a render goes on to the same bytes.
+//! Disks that fail: whatever call does not work, every file is the old one or the new one, and a render goes on to the
+//! same bytes.
 
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
@@ -13,7 +14,8 @@ use crate::parts::{bytes, done, folder};
 const RENDER: &str = "render scene.pbrt --size 20x14 --spp 40 --threads 1 -q --progress none -o out.exr --checkpoint ck \
                       --checkpoint-every 5ms";
 
-/// What the system does with a call. (Short writes are tried where the calls are made, in the crate that reads and writes.)
+/// What the system does with a call. (Short writes are tried where the calls are made, in the crate that reads and
+/// writes.)
 const FAULTS: [&str; 9] = [
     // Of libraries, of the scene, and of what is written: there are many.
     "openat:error=ENOSPC",
@@ -33,8 +35,8 @@ fn can_trace() -> bool {
     tried.is_ok_and(|status| status.success())
 }
 
-/// The render with the `k`-th of such calls failing in each thread, that of the picture and those that write checkpoints, and how many
-/// the thread with the most of them had.
+/// The render with the `k`-th of such calls failing in each thread, that of the picture and those that write
+/// checkpoints, and how many the thread with the most of them had.
 fn with_fault(folder: &Folder, fault: &str, k: u32) -> (i32, String, u32) {
     let calls = fault.split(':').next().unwrap();
     let program = env!("CARGO_BIN_EXE_lumbre");
@@ -55,7 +57,8 @@ fn with_fault(folder: &Folder, fault: &str, k: u32) -> (i32, String, u32) {
     (status, said, counts.into_values().max().unwrap_or(0))
 }
 
-/// Every call of a render that writes, syncs or renames fails once: a render with a checkpoint, and with a picture to replace.
+/// Every call of a render that writes, syncs or renames fails once: a render with a checkpoint, and with a picture to
+/// replace.
 #[test]
 fn a_failed_call_leaves_the_old_or_the_new_file() {
     if !can_trace() {
@@ -84,8 +87,8 @@ fn a_failed_call_leaves_the_old_or_the_new_file() {
             calls = calls.max(count);
             let found = bytes(&folder, "out.exr");
             assert!(found == new || (status != 0 && found == old), "{what}");
-            // What is refused is said; what the disk swallowed, or was tried again, is no failure. Where its libraries do not open,
-            // the system ends it.
+            // What is refused is said; what the disk swallowed, or was tried again, is no failure. Where its libraries
+            // do not open, the system ends it.
             let is_said = said.contains("error: ") || (status == 127 && said.contains("shared libraries"));
             assert!(
                 [0, 3, 4, 127, 137].contains(&status) && ([0, 137].contains(&status) || is_said),

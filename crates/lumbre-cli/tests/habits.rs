@@ -370,7 +370,8 @@ fn a_view_is_chosen_by_angles_or_by_places() {
     assert!(difference(&render("quarter.pfm", &["--azimuth", "90"]), &usual) > 0.02);
     let half = render("half.pfm", &["--zoom", "0.5"]);
     assert!((covered(&usual) / covered(&half) - 4.0).abs() < 0.6, "{}", covered(&usual) / covered(&half));
-    // From straight above, only the upper faces are seen, and the plan of 5 by 3 is as wide as it is high in its window.
+    // From straight above, only the upper faces are seen, and the plan of 5 by 3 is as wide as it is high in its
+    // window.
     let plan = render("plan.pfm", &["--ortho", "--eye", "3.5,2.5,50", "--target", "3.5,2.5,0"]);
     let columns = (0..60).filter(|&x| plan.pixel(x, 20).max_component() > 0.02).count() as f64;
     let rows = (0..40).filter(|&y| plan.pixel(30, y).max_component() > 0.02).count() as f64;

@@ -40,8 +40,8 @@ fn limited(folder: &Folder, shell: &mut Command, limit: &str, arguments: &[&str]
 
 #[test]
 fn where_the_system_grants_no_threads_the_work_is_done_without() {
-    // The system limits no one but plain users: another one than who runs the tests has no processes that count. Not every sh
-    // can set this limit.
+    // The system limits no one but plain users: another one than who runs the tests has no processes that count. Not
+    // every sh can set this limit.
     let user = ["--reuid", "54321", "--regid", "54321", "--clear-groups"];
     let is_root = Command::new("setpriv").args(user).arg("true").output().is_ok_and(|o| o.status.success());
     if !is_root {

@@ -1,5 +1,5 @@
-//! Malformed files of every kind, each with what the program says of it and the status that it ends with: the catalogue is the files
-//! of the folder `malformed`, for people to read.
+//! Malformed files of every kind, each with what the program says of it and the status that it ends with: the catalogue
+//! is the files of the folder `malformed`, for people to read.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 

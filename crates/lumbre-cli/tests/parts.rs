@@ -239,7 +239,8 @@ fn parts_with_two_tone_mappings_merge_with_the_given_one() {
     assert_eq!(bytes(&folder, "x.png"), bytes(&folder, "whole.png"));
 }
 
-/// A part whose head is true to the form, and whose planes are all zeros, which take no bytes: of a picture of this size.
+/// A part whose head is true to the form, and whose planes are all zeros, which take no bytes: of a picture of this
+/// size.
 fn forged(folder: &Folder, (width, height): (u32, u32)) -> Vec<u8> {
     done(folder, "render scene.pbrt -q -o small.part --samples 0..1 --size 20x14");
     let mut part = lumbre::Part::open(&folder.path("small.part"), |_| u64::MAX).unwrap();

@@ -1,5 +1,5 @@
-//! The table of topics of the mathematics, `docs/mathematics/topics.md`, walked line by line, and the same table in Spanish: everything
-//! it names is there, and every command runs.
+//! The table of topics of the mathematics, `docs/mathematics/topics.md`, walked line by line, and the same table in
+//! Spanish: everything it names is there, and every command runs.
 
 use std::collections::BTreeSet;
 use std::fs;

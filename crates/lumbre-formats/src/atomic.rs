@@ -39,9 +39,9 @@ pub fn probe_writable(path: &Path) -> Result<(), FormatError> {
         .map_err(|e| FormatError::io(path, CANNOT_WRITE, e))
 }
 
-/// Removes the temporary files of all writes that are under way, and keeps the process from beginning or ending any other:
-/// for one that is about to exit, where a signal or a deadline ends it. Every path holds its old complete file then, or its
-/// new one.
+/// Removes the temporary files of all writes that are under way, and keeps the process from beginning or ending any
+/// other: for one that is about to exit, where a signal or a deadline ends it. Every path holds its old complete file
+/// then, or its new one.
 pub fn abandon_writes() {
     const PATIENCE: Duration = Duration::from_millis(200);
     let start = Instant::now();
@@ -144,8 +144,8 @@ impl Disk for RealDisk {
     }
 }
 
-/// Windows replaces no file that another program has open, unless that program allows it. Scanners and indexers look into new files and
-/// are done in a moment, so it is tried again.
+/// Windows replaces no file that another program has open, unless that program allows it. Scanners and indexers look
+/// into new files and are done in a moment, so it is tried again.
 fn rename_when_closed(from: &Path, to: &Path) -> io::Result<()> {
     const PATIENCE: Duration = Duration::from_secs(2);
     const ERROR_ACCESS_DENIED: i32 = 5;
@@ -273,8 +273,8 @@ fn remove_left_over(folder: &Path) {
     }
 }
 
-/// Whether the process that wrote this temporary file is gone. It held a lock on it, also one on another machine or in a
-/// container of its own; but just after it was created a file has none yet.
+/// Whether the process that wrote this temporary file is gone. It held a lock on it, also one on another machine or in
+/// a container of its own; but just after it was created a file has none yet.
 fn is_left_over(part: &Path, owner: u32) -> bool {
     const MOMENT: Duration = Duration::from_secs(60);
     let is_file = fs::symlink_metadata(part).is_ok_and(|meta| meta.is_file());

@@ -23,8 +23,8 @@ pub struct Limits {
     pub nesting: u32,
     /// Files opened over the whole run, includes and textures counted each time (`--max-files`).
     pub files: u64,
-    /// The expansion ratio of compressed data, and of files that a scene includes again and again, beyond the first [`Limits::FREE_EXPANSION`] bytes of a stream
-    /// (`--max-expansion`).
+    /// The expansion ratio of compressed data, and of files that a scene includes again and again, beyond the first
+    /// [`Limits::FREE_EXPANSION`] bytes of a stream (`--max-expansion`).
     pub expansion: u64,
 }
 
@@ -120,15 +120,15 @@ impl Budget {
         Self { limits, ..Self::default() }
     }
 
-    /// Lets no file be opened but these, each by the name that is given here: for a scene from a stranger, who could name any file of
-    /// its reader as a texture or a buffer.
+    /// Lets no file be opened but these, each by the name that is given here: for a scene from a stranger, who could
+    /// name any file of its reader as a texture or a buffer.
     #[must_use]
     pub fn only(self, files: impl IntoIterator<Item = PathBuf>) -> Self {
         Self { only: Some(files.into_iter().collect()), ..self }
     }
 
-    /// Lets files in this folder be opened besides those of [`Budget::only`]. Names are compared as they are written, so that a link in the
-    /// folder leads to where it points: it has to be a folder in which there are none.
+    /// Lets files in this folder be opened besides those of [`Budget::only`]. Names are compared as they are written,
+    /// so that a link in the folder leads to where it points: it has to be a folder in which there are none.
     #[must_use]
     pub fn and_in(self, folder: PathBuf) -> Self {
         Self { folder: Some(folder), ..self }
@@ -167,7 +167,8 @@ impl Budget {
         self.held.as_deref()
     }
 
-    /// Whether there is a file of this name that may be opened, and no folder. Of others nothing is said, not even whether they exist.
+    /// Whether there is a file of this name that may be opened, and no folder. Of others nothing is said, not even
+    /// whether they exist.
     pub(crate) fn is_file(&self, path: &Path) -> bool {
         match self.held() {
             Some(files) => files.get(path).is_some(),

@@ -31,8 +31,8 @@ pub fn is_device_name(path: &Path) -> bool {
     device(path).is_some()
 }
 
-/// The device of a name without folders, by the rules of Microsoft, "Naming Files, Paths, and Namespaces": endings, and spaces before
-/// them, make no difference.
+/// The device of a name without folders, by the rules of Microsoft, "Naming Files, Paths, and Namespaces": endings, and
+/// spaces before them, make no difference.
 fn device_of_name(name: &str) -> Option<Device> {
     let stem = name.split(['.', ':']).next().unwrap_or(name).trim_end_matches(' ').to_ascii_uppercase();
     let is_port = |prefix: &str| {

@@ -427,8 +427,8 @@ impl Diagnostics {
         self.strictness == Strictness::Lenient
     }
 
-    /// The files that were read for a scene, by the names given: its own, and the files that they name. Also files that were
-    /// missing.
+    /// The files that were read for a scene, by the names given: its own, and the files that they name. Also files that
+    /// were missing.
     pub fn files_read(&self) -> &[PathBuf] {
         &self.files
     }

@@ -5,8 +5,8 @@ use std::fmt;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-/// Files by their names, for a scene that was dropped onto a page or came over a network. A scene that is read from them
-/// ([`crate::ReadOptions::held`]) opens no other file.
+/// Files by their names, for a scene that was dropped onto a page or came over a network. A scene that is read from
+/// them ([`crate::ReadOptions::held`]) opens no other file.
 ///
 /// Names are relative paths; `.` and `..` in them and a `/` in front have no effect on what they name.
 #[derive(Clone, Default, PartialEq, Eq)]

@@ -27,8 +27,8 @@ impl<'b> Input<'b> {
     ///
     /// # Errors
     /// [`FormatError::Io`] when the system refuses, `path` is not a regular file (a folder, a pipe, a
-    /// device) or the budget does not let it be opened ([`Budget::only`]), [`FormatError::Limit`] when the budget is exceeded, and [`FormatError::Input`] when gzip data
-    /// is damaged.
+    /// device) or the budget does not let it be opened ([`Budget::only`]), [`FormatError::Limit`] when the budget is
+    /// exceeded, and [`FormatError::Input`] when gzip data is damaged.
     pub fn open(path: &Path, budget: &'b Budget) -> Result<Self, FormatError> {
         let name: Arc<str> = path.display().to_string().into();
         if !budget.allows(path) {
@@ -72,8 +72,8 @@ impl<'b> Input<'b> {
         if input.bytes.starts_with(&[0x1F, 0x8B]) { input.unpacked(path, budget) } else { Ok(input) }
     }
 
-    /// [`Input::from_reader`] of a stream, which may never end: `is_text` says of its first bytes, as far as there are that many,
-    /// whether they begin a text. The first byte of a text that no text has, a zero, ends the reading.
+    /// [`Input::from_reader`] of a stream, which may never end: `is_text` says of its first bytes, as far as there are
+    /// that many, whether they begin a text. The first byte of a text that no text has, a zero, ends the reading.
     ///
     /// # Errors
     /// As for [`Input::open`], that of `is_text`, and with the place of that byte.
@@ -149,10 +149,12 @@ impl Deref for Input<'_> {
     }
 }
 
-/// Opens a regular file for reading, and returns its size too. It asks what the file is before it opens it, and never waits.
+/// Opens a regular file for reading, and returns its size too. It asks what the file is before it opens it, and never
+/// waits.
 ///
 /// # Errors
-/// [`FormatError::Io`] when the system refuses, and for folders, pipes, devices and the files of `/proc` and `/sys`, which need not end.
+/// [`FormatError::Io`] when the system refuses, and for folders, pipes, devices and the files of `/proc` and `/sys`,
+/// which need not end.
 pub fn open_regular(path: &Path) -> Result<(File, u64), FormatError> {
     let refuse = |action, source| FormatError::io(path, action, source);
     let not_regular = |kind: std::fs::FileType| {

@@ -1,7 +1,7 @@
 //! Measured materials in files of the RGL material database (`.bsdf`): spectral ones, and those of three channels.
 //!
-//! A file is a list of named arrays. Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering",
-//! SIGGRAPH Asia 2018.
+//! A file is a list of named arrays. Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition
+//! and Rendering", SIGGRAPH Asia 2018.
 
 use std::mem::size_of;
 use std::sync::Arc;

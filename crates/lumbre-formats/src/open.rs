@@ -179,7 +179,8 @@ pub fn open_scenes(
     Ok((scene, diagnostics))
 }
 
-/// Whether there is a file of this name that can be read as a scene, judged by its name, or else by its bytes; it is not parsed.
+/// Whether there is a file of this name that can be read as a scene, judged by its name, or else by its bytes; it is
+/// not parsed.
 ///
 /// # Errors
 /// As for [`open_scene`].

@@ -3,18 +3,18 @@
 use lumbre_math::DVec3;
 use lumbre_scene::{MeshDesc, UpAxis};
 
-/// What is up, and whether that is a guess: y, but z where meshes plainly stand on a plane of z (see [`stands_on_z`]); `origin` is
-/// what their positions are relative to.
+/// What is up, and whether that is a guess: y, but z where meshes plainly stand on a plane of z (see [`stands_on_z`]);
+/// `origin` is what their positions are relative to.
 pub(crate) fn up_of<'m>(meshes: impl Iterator<Item = &'m MeshDesc> + Clone, origin: DVec3) -> (UpAxis, bool) {
     if stands_on_z(meshes, origin) { (UpAxis::Z, true) } else { (UpAxis::Y, false) }
 }
 
-/// Whether meshes stand on a plane z = const and not on one of y: their lowest faces along z lie flat in one plane and make up
-/// most of what is seen from below, and
+/// Whether meshes stand on a plane z = const and not on one of y: their lowest faces along z lie flat in one plane and
+/// make up most of what is seen from below, and
 ///
 /// - along y no face is lowest and flat (a terrain, a scan on its table, a car in its street), or
-/// - that plane is z = 0, while y goes from one side of 0 to the other, and they are high (a tower that was drawn upwards from its
-///   plan).
+/// - that plane is z = 0, while y goes from one side of 0 to the other, and they are high (a tower that was drawn
+///   upwards from its plan).
 ///
 /// What is flat as a whole, a picture or a letter, stands on nothing.
 fn stands_on_z<'m>(meshes: impl Iterator<Item = &'m MeshDesc> + Clone, origin: DVec3) -> bool {

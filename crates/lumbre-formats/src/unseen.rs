@@ -2,8 +2,8 @@
 
 use lumbre_shading::{FloatTexture, Texture};
 
-/// Whether a surface of this alpha is invisible everywhere. In glTF and OBJ it then emits nothing. In pbrt-v4's language the light
-/// of a constant alpha of 0 stays: such a scene has a lamp that no ray hits.
+/// Whether a surface of this alpha is invisible everywhere. In glTF and OBJ it then emits nothing. In pbrt-v4's
+/// language the light of a constant alpha of 0 stays: such a scene has a lamp that no ray hits.
 pub(crate) fn is_unseen(alpha: Option<&FloatTexture>) -> bool {
     match alpha {
         Some(Texture::Constant(alpha)) => *alpha <= 0.0,

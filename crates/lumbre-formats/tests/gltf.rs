@@ -1137,8 +1137,8 @@ fn principled(material: &str) -> PrincipledParams {
     *params
 }
 
-/// A scene of one square with this many sets of texture coordinates, all different, and a material whose textures go by some:
-/// base colour, roughness, normals, transmission and clearcoat.
+/// A scene of one square with this many sets of texture coordinates, all different, and a material whose textures go by
+/// some: base colour, roughness, normals, transmission and clearcoat.
 fn with_sets(count: usize, named: [usize; 5]) -> (SceneDesc, Vec<String>) {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);

@@ -900,7 +900,8 @@ fn environments_are_equal_area_or_latitude_longitude() {
 fn goniometric_lights_exchange_y_and_z_of_their_image() {
     let dir = tempfile::tempdir().unwrap();
     let options = lumbre_formats::image::WriteOptions::default();
-    // The mean of the channels counts. In the square the middle is +z of the image's own space, which is +y of the light's.
+    // The mean of the channels counts. In the square the middle is +z of the image's own space, which is +y of the
+    // light's.
     let square: Vec<Rgb> = (0..8 * 8)
         .map(|i| if (2..6).contains(&(i % 8)) && (2..6).contains(&(i / 8)) { 4.0 } else { 1.0 })
         .map(|level| Rgb::new(0.5, 1.0, 1.5) * level)

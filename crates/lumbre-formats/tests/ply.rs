@@ -192,7 +192,8 @@ fn concave_and_many_cornered_faces_become_triangles() {
             n.length() / 2.0
         })
         .sum();
-    // The arrowhead has 4; the second face has it too, and beyond its side the polygon (0,4) (-2,2) (-2,1) (0,0) with 5.
+    // The arrowhead has 4; the second face has it too, and beyond its side the polygon (0,4) (-2,2) (-2,1) (0,0)
+    // with 5.
     assert!((area - (4.0 + 4.0 + 5.0)).abs() < 1e-9, "{area}");
 }
 

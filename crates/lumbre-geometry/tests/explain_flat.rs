@@ -1,5 +1,5 @@
-//! What is said of degenerate lines of whole numbers, and of shapes that are no quadrics: planes, disks, boxes, triangles, patches and
-//! tori. The oracle is arithmetic of whole numbers.
+//! What is said of degenerate lines of whole numbers, and of shapes that are no quadrics: planes, disks, boxes,
+//! triangles, patches and tori. The oracle is arithmetic of whole numbers.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 

@@ -1,7 +1,7 @@
 //! SSIM: how similar the structure of two images is.
 //!
-//! Z. Wang, A. C. Bovik, H. R. Sheikh and E. P. Simoncelli, "Image quality assessment: from error visibility to structural similarity",
-//! IEEE Transactions on Image Processing 13(4), 2004.
+//! Z. Wang, A. C. Bovik, H. R. Sheikh and E. P. Simoncelli, "Image quality assessment: from error visibility to
+//! structural similarity", IEEE Transactions on Image Processing 13(4), 2004.
 
 use lumbre_math::Elementary;
 
@@ -14,11 +14,11 @@ const RADIUS: usize = 5;
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
-/// The structural similarity of each pixel of two images, row by row from the top left: 1 where they are equal, at least -1. `None` when their sizes
-/// differ or they have no pixels.
+/// The structural similarity of each pixel of two images, row by row from the top left: 1 where they are equal, at
+/// least -1. `None` when their sizes differ or they have no pixels.
 ///
-/// It compares luminance as an sRGB display shows it, from 0 to 1; light above 1 counts as 1. At the border of the image the window
-/// is what lies inside. A pixel that is finite in one image only has a similarity of 0.
+/// It compares luminance as an sRGB display shows it, from 0 to 1; light above 1 counts as 1. At the border of the
+/// image the window is what lies inside. A pixel that is finite in one image only has a similarity of 0.
 pub fn ssim(image: &Image, reference: &Image) -> Option<Vec<f32>> {
     let same_size = (image.width(), image.height()) == (reference.width(), reference.height());
     if !same_size || image.pixels().is_empty() {

@@ -2,7 +2,8 @@
 
 use glam::DVec2;
 
-/// Sines, exponentials and their like, computed by the same operations everywhere; and what only some libraries round correctly.
+/// Sines, exponentials and their like, computed by the same operations everywhere; and what only some libraries round
+/// correctly.
 ///
 /// The methods of the standard library with the shorter names call the system's own, whose last digits differ from one
 /// library to the next, and with the instruction set of the processor. Pictures are to have the same bytes on every

@@ -430,8 +430,8 @@ impl Part {
 ///
 /// # Errors
 /// What is wrong with the file.
-/// A clear sky by longitude and latitude, (h, 2h, 3), without its sun at this azimuth and elevation; and the luminance of its
-/// zenith.
+/// A clear sky by longitude and latitude, (h, 2h, 3), without its sun at this azimuth and elevation; and the luminance
+/// of its zenith.
 #[pyfunction]
 pub(crate) fn clear_sky(
     py: Python<'_>,

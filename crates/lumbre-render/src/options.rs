@@ -101,8 +101,8 @@ impl Stop {
         Self { spp, time: None, noise: None, min_spp: None }
     }
 
-    /// Where a scene may say how many samples a pixel has, and nobody else says when to stop: at 64. Light of [`IntegratorKind::Pov`] is
-    /// free of noise but at edges: four samples there, and 16 where they differ.
+    /// Where a scene may say how many samples a pixel has, and nobody else says when to stop: at 64. Light of
+    /// [`IntegratorKind::Pov`] is free of noise but at edges: four samples there, and 16 where they differ.
     pub fn usual(kind: IntegratorKind, spp: Option<u32>) -> Self {
         match (spp, kind) {
             (Some(spp), _) => Self::at(spp),

@@ -305,16 +305,16 @@ fn a_lamp_in_the_middle_of_a_ball_that_disperses_shines_as_it_does_without() {
 
 #[test]
 fn a_caustic_seen_through_the_glass_that_made_it_counts_its_wavelength_once() {
-    // A lamp in a ball that disperses, seen from the middle of a second such ball: the photons and the camera's paths are
-    // both of the hero wavelength alone. Light crosses both balls straight, so that the floor is lit as without.
+    // A lamp in a ball that disperses, seen from the middle of a second such ball: the photons and the camera's paths
+    // are both of the hero wavelength alone. Light crosses both balls straight, so that the floor is lit as without.
     let at = DVec3::new(0.3, 0.1, 3.0);
     let desc = floor(vec![lamp(at)]);
     let [_, bare, _] = by_wavelengths(desc.clone(), IntegratorKind::Path { regularize: false }, 64);
     let desc = with(desc, dispersive(), Sphere::new(at, 0.5).unwrap());
     let desc = with(desc, dispersive(), Sphere::new(DVec3::new(0.1, 0.2, 0.9), 0.05).unwrap());
     let found = by_wavelengths(desc, IntegratorKind::Caustics, 512);
-    // Radiance is n² times that outside. What the eye's ball reflects inside comes back through the eye: of that, only every
-    // second reflection sees the floor. So (1 - R) / (1 - R²) is let through.
+    // Radiance is n² times that outside. What the eye's ball reflects inside comes back through the eye: of that, only
+    // every second reflection sees the floor. So (1 - R) / (1 - R²) is let through.
     let seen = |index: f32| index * index / (1.0 + ((index - 1.0) / (index + 1.0)).powi(2));
     const COUNT: u32 = 1000;
     let mut expected = [0.0; 3];

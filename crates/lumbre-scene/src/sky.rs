@@ -25,7 +25,8 @@ pub struct SunPosition {
 impl SunPosition {
     /// The position at a time, in seconds since 1970-01-01T00:00Z, at a place, in degrees to the north and to the east.
     ///
-    /// Right to about 0.01° from 1950 to 2050: J. Meeus, "Astronomical Algorithms", 1998, chapters 12, 13 and 25 (low accuracy).
+    /// Right to about 0.01° from 1950 to 2050: J. Meeus, "Astronomical Algorithms", 1998, chapters 12, 13 and 25 (low
+    /// accuracy).
     pub fn at(time: f64, latitude: f64, longitude: f64) -> Self {
         // Since noon of 2000-01-01.
         let days = time / 86400.0 - 10957.5;
@@ -251,8 +252,8 @@ impl ClearSky {
         lights
     }
 
-    /// The sky without its sun by longitude and latitude, with x in the centre. What is below the horizon is as bright as level
-    /// ground under both.
+    /// The sky without its sun by longitude and latitude, with x in the centre. What is below the horizon is as bright
+    /// as level ground under both.
     pub fn map(&self) -> Image {
         let of_sun =
             self.sunlight().map_or(Rgb::BLACK, |sun| sun.irradiance * self.sky.towards_sun().z as f32);
@@ -284,8 +285,8 @@ mod tests {
 
     #[test]
     fn the_sun_of_known_times_stands_where_it_does() {
-        // J. Meeus, example 25.a: right ascension 198.378°, declination -7.785° on 1992-10-13, 0 h TD, which is 59 s later in UT.
-        // At the pole the elevation is the declination.
+        // J. Meeus, example 25.a: right ascension 198.378°, declination -7.785° on 1992-10-13, 0 h TD, which is 59 s
+        // later in UT. At the pole the elevation is the declination.
         let pole = at("1992-10-12T23:59:01Z", 90.0, 0.0);
         assert!((pole.elevation + 7.785).abs() < 0.002, "{pole:?}");
         // Equinoxes and solstices of 2026: the sun passes the equator, or is highest above it.

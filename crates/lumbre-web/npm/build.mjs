@@ -1,7 +1,7 @@
 // Makes the package and the playground of what wasm-bindgen has left in generated/: node build.mjs FOLDER
 import { build } from "esbuild";
 import { execFileSync } from "node:child_process";
-import { cp, mkdir, readFile, readdir, rm, writeFile } from "node:fs/promises";
+import { access, cp, mkdir, readFile, readdir, rm, writeFile } from "node:fs/promises";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { brotliCompressSync, gzipSync } from "node:zlib";
@@ -11,6 +11,8 @@ const root = join(here, "../../..");
 const out = resolve(process.argv[2] ?? join(here, "out"));
 const generated = join(here, "generated");
 process.chdir(here);
+/** Bytes of the module that a server with brotli sends, at most. */
+const MOST = 3_000_000;
 
 // A function, so that a module that stopped can be replaced by a new one.
 const code = await readFile(join(generated, "lumbre_web.js"), "utf8");
@@ -70,6 +72,38 @@ for (const name of (await readdir(scenes)).sort()) {
   await writeFile(join(playground, "examples", `${name}.js`), example);
 }
 
+// The live parts of the book: what pages load beside the playground, of which they use the module.
+const live = join(out, "live");
+await mkdir(join(live, "files"), { recursive: true });
+await writeFile(join(live, "live.js"), await bundled("book/live.ts", "iife", { define: { WORKER: JSON.stringify(worker) } }));
+await cp("book/live.css", join(live, "live.css"));
+const pages = join(root, "docs");
+const texts = {};
+const others = [];
+for (const entry of await readdir(pages, { recursive: true, withFileTypes: true })) {
+  const path = join(entry.parentPath, entry.name);
+  const name = path.slice(pages.length + 1);
+  if (!entry.isFile()) continue;
+  // Pictures that scenes name lie in folders of their own; the others are of the pages.
+  const isNamed = /\.(pbrt|pov|csv|ply|obj|mtl|spd|txt)$/.test(name) && !name.startsWith("measurements/");
+  const isOther = /(^|\/)(pictures|images|textures)\/.*\.(png|exr|pfm|hdr|jpg|tga|nvdb|bsdf|glb|gltf|bin|ttf|ply)$/.test(name) && !(await isPicture(path));
+  if (!isNamed && !isOther) continue;
+  const bytes = await readFile(path);
+  if (isNamed && bytes.length < 1 << 16 && Buffer.from(bytes.toString("utf8")).equals(bytes)) texts[name] = bytes.toString("utf8");
+  else {
+    others.push(name);
+    await mkdir(dirname(join(live, "files", name)), { recursive: true });
+    await writeFile(join(live, "files", `${name}.js`), `lumbreFile(${JSON.stringify(name)}, ${JSON.stringify(bytes.toString("base64"))});\n`);
+  }
+}
+await writeFile(join(live, "files.js"), `lumbreTexts(${JSON.stringify(texts)}, ${JSON.stringify(others)});\n`);
+
+/** Whether a picture is rendered of the scene beside it. */
+async function isPicture(path) {
+  return access(path.replace(/\.png$/, ".pbrt")).then(() => path.endsWith(".png"), () => false);
+}
+
 const kilo = (bytes) => `${Math.round(bytes / 1000)} kB`;
-const script_size = Buffer.byteLength(worker);
-console.log(`lumbre.wasm ${kilo(wasm.length)}, gzip ${kilo(packed.length)}, brotli ${kilo(brotliCompressSync(wasm).length)}; worker.js ${kilo(script_size)}`);
+const brotli = brotliCompressSync(wasm).length;
+console.log(`lumbre.wasm ${kilo(wasm.length)}, gzip ${kilo(packed.length)}, brotli ${kilo(brotli)}; worker.js ${kilo(Buffer.byteLength(worker))}`);
+if (brotli > MOST) throw new Error(`lumbre.wasm takes ${brotli} bytes packed by brotli: more than ${MOST}`);

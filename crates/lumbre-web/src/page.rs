@@ -74,6 +74,16 @@ impl Scene {
         self.0.warnings().to_vec()
     }
 
+    #[wasm_bindgen(getter, js_name = isDivisible)]
+    pub fn is_divisible(&self) -> bool {
+        self.0.is_divisible()
+    }
+
+    #[wasm_bindgen(js_name = limitRows)]
+    pub fn limit_rows(&mut self, from: u32, to: u32) -> Result<(), JsValue> {
+        self.0.limit_rows(from, to).map_err(thrown)
+    }
+
     pub fn step(&mut self, milliseconds: f64) -> Result<String, JsValue> {
         let time = Duration::from_secs_f64(milliseconds.clamp(1.0, 1e7) / 1000.0);
         self.0.step(time).map(|pass| json(&pass)).map_err(thrown)

@@ -8,7 +8,8 @@ use lumbre::description::IntegratorKind;
 use lumbre::formats::{HeldFiles, Limits};
 use lumbre::image::unit_to_u8;
 use lumbre::{
-    CancelToken, DVec3, NoProgress, Picture, Ray, ReadOptions, RenderOptions, RenderState, SaveOptions, Scene,
+    CancelToken, DVec3, NoProgress, Picture, PixelBounds, Ray, ReadOptions, RenderOptions, RenderState,
+    SaveOptions, Scene,
 };
 use lumbre_cli::{Defaults, Format, Language, Query, Request, SceneNames};
 use serde::{Deserialize, Serialize};
@@ -39,8 +40,10 @@ pub struct Wanted {
 /// How far a picture is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Pass {
-    /// Width and height in pixels.
+    /// Width and height of the whole picture in pixels.
     pub size: (u32, u32),
+    /// The part of it that is rendered: the first column and row, and those beyond the last.
+    pub bounds: [u32; 4],
     /// Samples of each pixel.
     pub spp: u32,
     /// Those that there will be.
@@ -159,7 +162,32 @@ impl Session {
         &self.warnings
     }
 
-    /// Width and height of the picture in pixels.
+    /// Renders these rows alone, the first and that beyond the last: so several sessions of the same scene share its picture. What was
+    /// rendered before is given up.
+    ///
+    /// # Errors
+    /// [`ProblemKind::Usage`] where there are none of these rows, and for a picture that is denoised, which has to be whole.
+    pub fn limit_rows(&mut self, from: u32, to: u32) -> Result<(), Problem> {
+        if self.options.guides {
+            return Err(Problem::new(
+                ProblemKind::Usage,
+                "a picture that is denoised is rendered as a whole",
+            ));
+        }
+        let mut options = self.options.clone();
+        let rows = PixelBounds { x0: 0, y0: from, x1: options.width, y1: to };
+        options.crop = Some(options.crop.map_or(rows, |crop| crop.intersection(&rows)));
+        options.bounds().map_err(lumbre::Error::from)?;
+        (self.options, self.state, self.picture) = (options, None, None);
+        Ok(())
+    }
+
+    /// Whether its rows may be rendered apart.
+    pub fn is_divisible(&self) -> bool {
+        !self.options.guides
+    }
+
+    /// Width and height of the whole picture in pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.options.width, self.options.height)
     }
@@ -197,8 +225,10 @@ impl Session {
     pub fn pass(&self) -> Option<Pass> {
         let picture = self.picture.as_ref()?;
         let stats = picture.stats();
+        let PixelBounds { x0, y0, x1, y1 } = picture.bounds();
         Some(Pass {
             size: self.size(),
+            bounds: [x0, y0, x1, y1],
             spp: stats.spp,
             target: self.options.stop.spp,
             stride: stats.stride.unwrap_or(0),
@@ -207,8 +237,8 @@ impl Session {
         })
     }
 
-    /// The picture as displays show it: red, green, blue in sRGB and alpha of each pixel, row by row from the top, as a PNG of
-    /// the program has them. Empty before the first pass.
+    /// What is rendered of the picture, as displays show it: red, green, blue in sRGB and alpha of each pixel, row by row from the top,
+    /// as a PNG of the program has them. Empty before the first pass.
     pub fn pixels(&self) -> Vec<u8> {
         let Some(picture) = &self.picture else { return Vec::new() };
         let (image, left) = picture.displayed(&self.save);

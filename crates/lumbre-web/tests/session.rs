@@ -46,6 +46,35 @@ fn a_picture_is_the_same_however_its_time_is_cut() {
 }
 
 #[test]
+fn sessions_of_some_rows_each_have_those_of_the_whole() {
+    let mut whole = open(SCENE);
+    whole.step(Duration::from_secs(600)).unwrap();
+    let mut rows = Vec::new();
+    for (from, to) in [(0, 9), (9, 20), (20, 28)] {
+        let mut part = open(SCENE);
+        assert!(part.is_divisible());
+        part.limit_rows(from, to).unwrap();
+        let pass = part.step(Duration::from_secs(600)).unwrap();
+        assert_eq!((pass.size, pass.bounds, pass.done), ((40, 28), [0, from, 40, to], true));
+        rows.extend(part.pixels());
+    }
+    assert_eq!(rows, whole.pixels());
+    assert_eq!(open(SCENE).limit_rows(28, 40).unwrap_err().kind, ProblemKind::Usage);
+    // A film's own part of the picture is where it belongs.
+    let cropped = SCENE.replacen("Film \"rgb\"", "Film \"rgb\" \"integer pixelbounds\" [ 5 25 4 14 ]", 1);
+    let mut session = open(&cropped);
+    let pass = session.step(Duration::from_secs(600)).unwrap();
+    assert_eq!((pass.size, pass.bounds), ((40, 28), [5, 4, 25, 14]));
+    assert_eq!(session.pixels().len(), 4 * 20 * 10);
+    // What is denoised is no picture of some rows.
+    let model = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let mut model = Session::open(held(&[("a.obj", model)]), "a.obj", &Wanted::default()).unwrap();
+    if !model.is_divisible() {
+        assert_eq!(model.limit_rows(0, 4).unwrap_err().kind, ProblemKind::Usage);
+    }
+}
+
+#[test]
 fn a_picture_has_the_pixels_of_a_png_of_the_facade() {
     let folder = std::env::temp_dir().join(format!("lumbre-web-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();

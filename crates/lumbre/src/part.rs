@@ -109,7 +109,8 @@ impl Job {
         .into()
     }
 
-    /// In what another render differs, as `seed 3 there, 5 here`, where the other one is here; nothing for the same render.
+    /// In what another render differs, as `seed 3 there, 5 here`, where the other one is here; nothing for the same
+    /// render.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let names = self.identity.keys().chain(other.identity.keys());
         let names: std::collections::BTreeSet<&String> = names.collect();

@@ -97,8 +97,8 @@ pub(crate) struct Volume {
     pub(crate) g: f64,
 }
 
-/// Uniform cubic B-splines with circular cross sections, and the hair of M. Chiang and others, "A Practical and Controllable Hair and Fur
-/// Model for Production Path Tracing", 2016.
+/// Uniform cubic B-splines with circular cross sections, and the hair of M. Chiang and others, "A Practical and
+/// Controllable Hair and Fur Model for Production Path Tracing", 2016.
 #[derive(Debug)]
 pub(crate) struct Hair {
     /// The control points of each strand, four or more, as many for all.
@@ -120,7 +120,8 @@ impl Hair {
         self.radii[0] + (self.radii[1] - self.radii[0]) * share
     }
 
-    /// The widths at both ends of the curve of a strand, which begins at its second control point and ends at the last but one.
+    /// The widths at both ends of the curve of a strand, which begins at its second control point and ends at the last
+    /// but one.
     pub(crate) fn widths(&self) -> [f64; 2] {
         let steps = (self.strands[0].len() - 1) as f64;
         [2.0 * self.radius(1.0 / steps), 2.0 * self.radius(1.0 - 1.0 / steps)]

@@ -191,7 +191,8 @@ impl Header {
     }
 }
 
-/// A number in double precision, or what is expected instead: one that is too large or too small would become another number.
+/// A number in double precision, or what is expected instead: one that is too large or too small would become another
+/// number.
 fn number(field: &str) -> Result<f64, &'static str> {
     let value: f64 = field.parse().map_err(|_| "a number")?;
     let mantissa = field.split(['e', 'E']).next().unwrap_or(field);

@@ -5,8 +5,9 @@ use std::sync::mpsc;
 
 use rayon::ThreadPool;
 
-/// Calls `work` on the threads of `pool` for each item of `next`, and `take` on the calling thread for each answer, in the order
-/// of the items; without a pool, all on the calling thread. No more than a few items a thread are held at a time. It ends at the first error, in that order.
+/// Calls `work` on the threads of `pool` for each item of `next`, and `take` on the calling thread for each answer, in
+/// the order of the items; without a pool, all on the calling thread. No more than a few items a thread are held at a
+/// time. It ends at the first error, in that order.
 ///
 /// # Errors
 /// The first of any of the three.

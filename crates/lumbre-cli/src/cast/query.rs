@@ -128,11 +128,12 @@ pub(super) fn answer(
     Ok(block)
 }
 
-/// Answers a list of rays or points, CSV or `.npy`, as CSV: what `lumbre cast` prints. `name` names the list in messages.
+/// Answers a list of rays or points, CSV or `.npy`, as CSV: what `lumbre cast` prints. `name` names the list in
+/// messages.
 ///
 /// # Errors
-/// [`Failure::Input`] with the place of what is wrong in the list, and where there is no answer for a point; [`Failure::Limit`] where
-/// the answers take more bytes than `limit`.
+/// [`Failure::Input`] with the place of what is wrong in the list, and where there is no answer for a point;
+/// [`Failure::Limit`] where the answers take more bytes than `limit`.
 pub fn cast(scene: &Scene, query: Query, name: &str, list: Vec<u8>, limit: usize) -> Result<String, Failure> {
     let mut rays = RayReader::new(Bytes::from_reader(name, Cursor::new(list))?, query.rows())?;
     let decoder = rays.decoder();

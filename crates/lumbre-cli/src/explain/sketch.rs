@@ -323,7 +323,10 @@ pub(super) fn svg(space: &Space, title: &str) -> String {
     let (start, step) = (place(ray.origin), place(ray.origin + ray.direction) - place(ray.origin));
     // What is dotted is not to scale.
     let first = if has_origin { f64::NEG_INFINITY } else { from + DOTTED * (to - from) };
-    drawing.finish(title, [start, step], first)
+    let zero = place(DVec3::ZERO);
+    let view = [zero].into_iter().chain(DVec3::AXES.map(|axis| scale * eye.flat(axis)));
+    let view: Vec<String> = view.map(|p| format!("{} {}", p.x, p.y)).collect();
+    drawing.finish(title, [start, step], first, &view.join(" "))
 }
 
 /// Grows by what is shown.
@@ -581,14 +584,15 @@ impl Drawing {
         self.labels.keep_off(rect);
     }
 
-    fn finish(mut self, title: &str, [start, step]: [DVec2; 2], first: f64) -> String {
+    /// `view` is where the origin of the space is seen, and by how much a unit along x, y and z moves that: for what is dragged.
+    fn finish(mut self, title: &str, [start, step]: [DVec2; 2], first: f64, view: &str) -> String {
         self.wanted.sort_by_key(|wanted| wanted.rank);
         let mut placed: Vec<Option<Label>> = vec![None; self.marks.len()];
         for Wanted { mark, text, anchor, .. } in &self.wanted {
             placed[*mark] = Some(self.labels.place(text, *anchor));
         }
         let mut out = format!(
-            "<svg class=\"sketch\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" role=\"group\" \
+            "<svg class=\"sketch\" data-view=\"{view}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" role=\"group\" \
              aria-label=\"{title}\" xmlns=\"http://www.w3.org/2000/svg\" font-family=\"serif\" font-style=\"italic\" \
              font-size=\"{FONT_SIZE}\" text-anchor=\"middle\" stroke-linecap=\"round\" stroke-linejoin=\"round\">",
             title = escaped(title)

@@ -58,7 +58,8 @@ use texts::Texts;
 
 Exit status 2 for a wrong expression, 3 for one in a file or on standard input.")]
 pub(crate) struct Arguments {
-    /// What to evaluate, with ; between expressions. Quote it: the shell treats brackets specially. Without an expression, a prompt opens.
+    /// What to evaluate, with ; between expressions. Quote it: the shell treats brackets specially. Without an
+    /// expression, a prompt opens.
     expression: Vec<String>,
     /// Evaluate the statements of this file; - is standard input.
     #[arg(long, value_name = "FILE", conflicts_with = "expression")]
@@ -113,7 +114,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 /// Evaluates an expression and returns what `lumbre math` prints of it, as text or as JSON.
 ///
 /// # Errors
-/// [`Failure::Usage`] with the place of a mistake, and [`Failure::Limit`] where more would be printed than `limit` bytes.
+/// [`Failure::Usage`] with the place of a mistake, and [`Failure::Limit`] where more would be printed than `limit`
+/// bytes.
 pub fn calculate(text: &str, language: Language, as_json: bool, limit: usize) -> Result<String, Failure> {
     let texts = language.choose(&ENGLISH, &SPANISH);
     let form = if as_json { Form::Json } else { Form::Text };

@@ -506,8 +506,8 @@ impl Group {
         let firsts: Vec<u32> = (0..curves.len() as u32).map(|i| 4 * i).collect();
         self.add(GEOMETRY_FLAT_BEZIER_CURVE, |api, geometry| {
             let set = api.set_shared_buffer;
-            // SAFETY: `self.curves` holds both arrays as long as the scene: four numbers a control point, and the first of
-            // four control points of each curve.
+            // SAFETY: `self.curves` holds both arrays as long as the scene: four numbers a control point, and the first
+            // of four control points of each curve.
             unsafe {
                 let (points, count) = (floats.as_ptr().cast(), 4 * curves.len());
                 set(geometry, BUFFER_VERTEX, 0, FORMAT_FLOAT4, points, 0, 16, count);

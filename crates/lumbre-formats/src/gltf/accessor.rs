@@ -477,8 +477,8 @@ impl<'a> Accessor<'a> {
     }
 }
 
-/// Splits elements of `n` numbers, and their bytes, over threads. Compiled once for each type of number, and called once for many
-/// elements.
+/// Splits elements of `n` numbers, and their bytes, over threads. Compiled once for each type of number, and called
+/// once for many elements.
 fn in_shares<T: Send>(
     n: usize,
     out: &mut [T],

@@ -1,5 +1,5 @@
-//! Compressed buffer views (`EXT_meshopt_compression`, 2021, and its successor `KHR_meshopt_compression`, a draft of 2025;
-//! Khronos. The codecs are those of A. Kapoulkine's meshoptimizer).
+//! Compressed buffer views (`EXT_meshopt_compression`, 2021, and its successor `KHR_meshopt_compression`, a draft of
+//! 2025; Khronos. The codecs are those of A. Kapoulkine's meshoptimizer).
 
 use super::file::File;
 use super::json::{Read, Value};
@@ -570,7 +570,8 @@ mod tests {
 
     #[test]
     fn colours_come_out_of_brightness_and_differences() {
-        // Red, green and blue of 6 bits: y = (r + 2 g + b) / 4 and so on, worked by hand for (40, 24, 8) and a = 21 of 31.
+        // Red, green and blue of 6 bits: y = (r + 2 g + b) / 4 and so on, worked by hand for (40, 24, 8) and a = 21
+        // of 31.
         let (y, co, cg) = (24_u8, 16_i8, 0_i8);
         let mut four = [y, co as u8, cg as u8, 32 | 21];
         colours(&mut four, 4);

@@ -621,7 +621,8 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
     })
 }
 
-/// Points and lines as solids, each with its two vertices. `size` is that of the whole model, or 0 to use the primitive's own.
+/// Points and lines as solids, each with its two vertices. `size` is that of the whole model, or 0 to use the
+/// primitive's own.
 fn thin_shapes(positions: &[Vec3], assembly: &Assembly, size: f64) -> Vec<(Shape, [u32; 2])> {
     let at = |i: u32| positions[i as usize].as_dvec3();
     let is_size = |size: &f64| *size > 0.0 && size.is_finite();

@@ -7,8 +7,8 @@ use flate2::Crc;
 
 use super::ImageFormat;
 
-/// The first byte of what is damaged in a file that its decoder refused after it had read up to `read`: of a chunk of PNG or
-/// WebP or a segment of JPEG that is cut off or not one, or else of the pixels; of other formats, `read`.
+/// The first byte of what is damaged in a file that its decoder refused after it had read up to `read`: of a chunk of
+/// PNG or WebP or a segment of JPEG that is cut off or not one, or else of the pixels; of other formats, `read`.
 pub(super) fn first_damage(format: ImageFormat, bytes: &[u8], read: u64) -> u64 {
     match format {
         ImageFormat::Png => png(bytes),

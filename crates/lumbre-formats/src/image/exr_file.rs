@@ -316,8 +316,8 @@ pub(super) fn encode(layers: &Layers, options: &WriteOptions) -> std::io::Result
     Ok(bytes)
 }
 
-/// Sorts the attributes of the one header of a file by name. Each is a name and a type, both ended by a zero, a length of four bytes, and a
-/// value; a zero ends the list.
+/// Sorts the attributes of the one header of a file by name. Each is a name and a type, both ended by a zero, a length
+/// of four bytes, and a value; a zero ends the list.
 fn sort_attributes(file: &mut [u8]) {
     const START: usize = 8;
     let end_of = |at: usize| -> Option<usize> {

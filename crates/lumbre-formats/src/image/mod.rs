@@ -1,4 +1,5 @@
-//! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI and WebP in; PNG, JPEG, QOI, WebP, EXR, HDR and PFM out, and animated GIF.
+//! Image files: PNG, JPEG, EXR, HDR, PFM, TGA, BMP, QOI and WebP in; PNG, JPEG, QOI, WebP, EXR, HDR and PFM out, and
+//! animated GIF.
 
 mod damage;
 mod decode;

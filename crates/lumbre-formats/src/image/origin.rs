@@ -16,8 +16,8 @@ const NEAR: u64 = 64 << 10;
 pub(super) const EXIF: &[u8] = b"II*\0\x08\0\0\0\x01\0\x31\x01\x02\0\x07\0\0\0\x1A\0\0\0\0\0\0\0Lumbre\0";
 
 /// Whether the file `path` is an image that Lumbre wrote, by its metadata: the text `Software` of a PNG, the attribute
-/// `software` of an EXR, the line `SOFTWARE` of an HDR, the tag Software of a JPEG or a WebP. A PFM has no place for such, so that none is
-/// known to be ours; and so for what cannot be read.
+/// `software` of an EXR, the line `SOFTWARE` of an HDR, the tag Software of a JPEG or a WebP. A PFM has no place for
+/// such, so that none is known to be ours; and so for what cannot be read.
 pub fn is_own_image(path: &Path) -> bool {
     let Ok((mut file, length)) = open_regular(path) else { return false };
     let mut start = Vec::new();

@@ -1,5 +1,5 @@
-//! Portable float maps: a text header `PF` or `Pf`, the size and a scale whose sign is the byte order, then single-precision
-//! numbers from the bottom row up (P. Debevec's format, after the Netpbm ones).
+//! Portable float maps: a text header `PF` or `Pf`, the size and a scale whose sign is the byte order, then
+//! single-precision numbers from the bottom row up (P. Debevec's format, after the Netpbm ones).
 
 use std::sync::Arc;
 

@@ -22,8 +22,8 @@ pub(crate) fn open_scene_image(
 }
 
 impl ImageFile {
-    /// The image over its display window, black and transparent where the file has no pixels. Texels that are not finite are black,
-    /// and a warning names the first of them.
+    /// The image over its display window, black and transparent where the file has no pixels. Texels that are not
+    /// finite are black, and a warning names the first of them.
     ///
     /// # Errors
     /// [`FormatError::Limit`] when the budget does not allow this many pixels.

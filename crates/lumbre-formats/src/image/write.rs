@@ -31,11 +31,13 @@ pub struct WriteOptions {
     /// If the image is a crop of a larger one: the position of its top left pixel (x, y) and the larger one's
     /// width and height. Written to EXR as data and display window; other formats have only the crop.
     pub exr_window: Option<(i32, i32, u32, u32)>,
-    /// The denoiser that the image went through, for the metadata of EXR (attribute `denoiser`) and PNG (text `Denoiser`).
+    /// The denoiser that the image went through, for the metadata of EXR (attribute `denoiser`) and PNG (text
+    /// `Denoiser`).
     pub denoiser: Option<&'static str>,
     /// Attributes of EXR's own: texts by name.
     pub exr_attributes: Vec<(String, String)>,
-    /// Further metadata by name, for EXR (lines of the attribute `comments`) and PNG (texts). Names are of letters and digits.
+    /// Further metadata by name, for EXR (lines of the attribute `comments`) and PNG (texts). Names are of letters and
+    /// digits.
     pub metadata: Vec<(String, String)>,
 }
 

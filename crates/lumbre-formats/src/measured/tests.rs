@@ -1,4 +1,5 @@
-//! A synthetic file whose BRDF is known: GGX facets of α 0.4, and a spectrum that rises from 0.2 at 360 nm to 0.8 at 830 nm.
+//! A synthetic file whose BRDF is known: GGX facets of α 0.4, and a spectrum that rises from 0.2 at 360 nm to 0.8 at
+//! 830 nm.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,7 +1,8 @@
 //! Sparse volumes in NanoVDB files (`.nvdb`) of major version 32: grids of numbers, packed or not.
 //!
-//! K. Museth, "NanoVDB: A GPU-Friendly and Portable VDB Data Structure For Real-Time Rendering And Simulation", SIGGRAPH Talks 2021. Read
-//! are grids of single and double precision and of quantised numbers that are fog volumes; they stay as sparse as they are stored.
+//! K. Museth, "NanoVDB: A GPU-Friendly and Portable VDB Data Structure For Real-Time Rendering And Simulation",
+//! SIGGRAPH Talks 2021. Read are grids of single and double precision and of quantised numbers that are fog volumes;
+//! they stay as sparse as they are stored.
 
 mod codec;
 mod tree;
@@ -27,8 +28,8 @@ use codec::Codec;
 pub struct NanoGrid {
     /// The voxels. The space of its medium is the world of the file.
     pub grid: SparseGrid,
-    /// The box around the active voxels, each taken as a cube that begins at its whole coordinates, in the world of the file: the least
-    /// and the largest coordinates.
+    /// The box around the active voxels, each taken as a cube that begins at its whole coordinates, in the world of the
+    /// file: the least and the largest coordinates.
     pub world_bounds: [DVec3; 2],
 }
 
@@ -52,7 +53,8 @@ pub fn grid_names(bytes: &[u8], name: &Arc<str>, budget: &Budget) -> Result<Vec<
 /// Reads the first grid of this name; `None` where the file has none. What is read is charged to the budget.
 ///
 /// # Errors
-/// [`FormatError::Input`] with the byte of what is wrong, which for packed grids is a byte of the unpacked one, and [`FormatError::Limit`].
+/// [`FormatError::Input`] with the byte of what is wrong, which for packed grids is a byte of the unpacked one, and
+/// [`FormatError::Limit`].
 pub fn read(
     bytes: &[u8],
     name: &Arc<str>,

@@ -394,8 +394,8 @@ impl<'a> Reader<'a> {
         Ok(number)
     }
 
-    /// Reads the corners of an element into `face`; false where it waits for what comes later, or is passed over with what
-    /// `dropped` says of the reason.
+    /// Reads the corners of an element into `face`; false where it waits for what comes later, or is passed over with
+    /// what `dropped` says of the reason.
     fn read_face(
         &mut self,
         keyword: Word<'a>,

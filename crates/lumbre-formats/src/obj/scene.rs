@@ -25,7 +25,8 @@ use crate::ply::{push_thin, unsaid_material};
 use crate::standing::up_of;
 use crate::unseen::is_unseen;
 
-/// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up, or z where the meshes plainly stand on a plane of z.
+/// Reads the OBJ file `path` with its materials and textures, each mesh a shape; y is up, or z where the meshes plainly
+/// stand on a plane of z.
 ///
 /// A material with any of the PBR keys (`Pr`, `Pm`, `Ps`, `Pc`, `aniso` and their maps) becomes the principled
 /// one, clear when `illum` is 6 or 7. Of the others, those with `illum` 6 or 7 become glass, those with

@@ -20,8 +20,8 @@ pub(super) fn factor(space: &ColourSpace, rgb: [f64; 3]) -> Rgb {
     space.to_rec709(rgb).map(|c| c.max(0.0))
 }
 
-/// What a film makes of light in linear Rec. 709 which takes light of this temperature in kelvin for white, by the linear Bradford transform;
-/// `None` for a temperature that has no colour.
+/// What a film makes of light in linear Rec. 709 which takes light of this temperature in kelvin for white, by the
+/// linear Bradford transform; `None` for a temperature that has no colour.
 pub(super) fn balanced(kelvin: f64) -> Option<DMat3> {
     let lit = ColourSpace { white: white_point(kelvin)?, ..ColourSpace::REC709 };
     // The same light in the space of the other white, and then the same appearance.

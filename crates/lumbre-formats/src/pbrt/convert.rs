@@ -428,8 +428,8 @@ impl<'b, 'd> Converter<'b, 'd> {
         }
     }
 
-    /// Adds a moving shape to the open object, or else to the world, in an object of its own. Its transform is what comes before
-    /// the motion.
+    /// Adds a moving shape to the open object, or else to the world, in an object of its own. Its transform is what
+    /// comes before the motion.
     pub fn push_moving(
         &mut self,
         shape: ShapeDesc,

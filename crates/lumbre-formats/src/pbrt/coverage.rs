@@ -1,4 +1,5 @@
-//! The page of the book that says what becomes of every directive, type and parameter, made from what the reader asks for and says.
+//! The page of the book that says what becomes of every directive, type and parameter, made from what the reader asks
+//! for and says.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
@@ -14,8 +15,8 @@ use crate::{Budget, Diagnostics};
 /// Set to write the page instead of comparing it.
 const UPDATE: &str = "LUMBRE_UPDATE_PAGES";
 
-/// Kinds of things: their folder in the book, the noun of the reader for their owner, their directive, and types besides those of
-/// [`KINDS`].
+/// Kinds of things: their folder in the book, the noun of the reader for their owner, their directive, and types
+/// besides those of [`KINDS`].
 const ALL: [(&str, &str, &str, &[&str]); 12] = [
     ("cameras", "camera", "Camera", &["environment"]),
     ("films", "film", "Film", &["rgb", "gbuffer", "spectral", "image"]),

@@ -1,4 +1,5 @@
-//! Displacement of a mesh by a texture: its faces are split until their edges are short, and then every vertex moves along its normal.
+//! Displacement of a mesh by a texture: its faces are split until their edges are short, and then every vertex moves
+//! along its normal.
 
 use std::collections::HashMap;
 use std::sync::Arc;

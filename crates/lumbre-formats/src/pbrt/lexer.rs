@@ -37,8 +37,8 @@ impl Token {
 
 /// Splits the bytes of one file into tokens.
 ///
-/// White space is space, tab, CR and LF; `#` between tokens starts a comment up to the end of its line. Lines end with LF,
-/// CRLF or a lone CR. A UTF-8 byte order mark is skipped. Comments may be in any encoding; strings are UTF-8.
+/// White space is space, tab, CR and LF; `#` between tokens starts a comment up to the end of its line. Lines end with
+/// LF, CRLF or a lone CR. A UTF-8 byte order mark is skipped. Comments may be in any encoding; strings are UTF-8.
 #[derive(Debug)]
 pub(super) struct Lexer<B> {
     bytes: B,
@@ -132,8 +132,8 @@ impl<B: Deref<Target = [u8]>> Lexer<B> {
         Ok(Some(Token { kind, start, end }))
     }
 
-    /// Reads finite decimal numbers, which stand in long lists, faster than token by token. It stops before the first token that
-    /// is something else, or that `take` does not accept.
+    /// Reads finite decimal numbers, which stand in long lists, faster than token by token. It stops before the first
+    /// token that is something else, or that `take` does not accept.
     pub fn numbers<E>(
         &mut self,
         mut take: impl FnMut(f64) -> std::result::Result<bool, E>,

@@ -316,7 +316,8 @@ impl Converter<'_, '_> {
         Ok(Glow::Heat(Box::new(Heat { temperature, offset, scale, factor, colours })))
     }
 
-    /// A coefficient of absorption or scattering, 1 where none is given, and its spectrum where it is more than a colour.
+    /// A coefficient of absorption or scattering, 1 where none is given, and its spectrum where it is more than a
+    /// colour.
     fn coefficient(
         &mut self,
         params: &Params,

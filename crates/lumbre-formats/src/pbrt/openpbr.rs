@@ -1,5 +1,5 @@
-//! Material `openpbr`: the parameters of OpenPBR Surface 1.1 (Academy Software Foundation, 2024) by their names, as far as the layers of the
-//! principled material have them.
+//! Material `openpbr`: the parameters of OpenPBR Surface 1.1 (Academy Software Foundation, 2024) by their names, as far
+//! as the layers of the principled material have them.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! The pages of the book about the scene language, held against the reader: every name that it knows has a page, every parameter on a page is
-//! known, and every default is the one that is taken.
+//! The pages of the book about the scene language, held against the reader: every name that it knows has a page, every
+//! parameter on a page is known, and every default is the one that is taken.
 
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 

@@ -1,9 +1,10 @@
-//! What cameras make of colours: for each camera, and for each temperature of the light that it takes for white, the matrix from the linear
-//! Rec. 709 of light to that of the picture which comes nearest to the camera's over a set of common reflectances. Grey is exact.
+//! What cameras make of colours: for each camera, and for each temperature of the light that it takes for white, the
+//! matrix from the linear Rec. 709 of light to that of the picture which comes nearest to the camera's over a set of
+//! common reflectances. Grey is exact.
 //!
-//! Computed from the spectral sensitivities of PhysLight, by Anders Langlands and Luca Fascione, which are licensed under the Apache
-//! License, Version 2.0 (<https://www.apache.org/licenses/LICENSE-2.0>). "Physlight: An End-to-End Pipeline for Scene-Referred Lighting",
-//! SIGGRAPH 2020 Talks.
+//! Computed from the spectral sensitivities of PhysLight, by Anders Langlands and Luca Fascione, which are licensed
+//! under the Apache License, Version 2.0 (<https://www.apache.org/licenses/LICENSE-2.0>). "Physlight: An End-to-End
+//! Pipeline for Scene-Referred Lighting", SIGGRAPH 2020 Talks.
 
 mod curves;
 
@@ -17,9 +18,9 @@ use curves::{CURVES, Curves, FIRST_NM, STEP_NM};
 const KELVIN: [f64; 12] =
     [2800.0, 3200.0, 3600.0, 4000.0, 4500.0, 5000.0, 5500.0, 6000.0, 6500.0, 7500.0, 9000.0, 12_000.0];
 
-/// The matrix of a camera for light of this temperature, interpolated in 1/T between the neighbouring temperatures, and as at the end
-/// of the table beyond; `None` for an unknown camera. Grey under D65 becomes what the camera makes of that spectrum; the rest comes as near
-/// as three channels can.
+/// The matrix of a camera for light of this temperature, interpolated in 1/T between the neighbouring temperatures, and
+/// as at the end of the table beyond; `None` for an unknown camera. Grey under D65 becomes what the camera makes of
+/// that spectrum; the rest comes as near as three channels can.
 pub(super) fn matrix(name: &str, kelvin: f64) -> Option<DMat3> {
     let (_, matrices) = SENSORS.iter().find(|(known, _)| *known == name)?;
     let curves = CURVES.iter().find(|known| known.name == name)?;
@@ -35,8 +36,9 @@ pub(super) fn matrix(name: &str, kelvin: f64) -> Option<DMat3> {
     Some(DMat3::from_diagonal(missed) * fitted(kelvin))
 }
 
-/// The sensitivities of a camera, and its matrix for light of this temperature, for paths that carry wavelengths; `None` for an unknown
-/// camera. Beyond the temperatures that are known of its sensitivities, the matrix changes as that for colours does.
+/// The sensitivities of a camera, and its matrix for light of this temperature, for paths that carry wavelengths;
+/// `None` for an unknown camera. Beyond the temperatures that are known of its sensitivities, the matrix changes as
+/// that for colours does.
 pub(super) fn spectral(name: &str, kelvin: f64) -> Option<SensorCurves> {
     let curves = CURVES.iter().find(|known| known.name == name)?;
     let rows = |i: usize| DMat3::from_cols_array(&curves.xyz[i].map(f64::from)).transpose();
@@ -69,7 +71,8 @@ fn between(table: &[f64], kelvin: f64) -> (usize, usize, f64) {
     (after - 1, after, ((1.0 / kelvin - low) / (high - low)).clamp(0.0, 1.0))
 }
 
-/// The colour that a camera gives to light of the spectrum of D65 and luminance 1, for white light of one of its temperatures.
+/// The colour that a camera gives to light of the spectrum of D65 and luminance 1, for white light of one of its
+/// temperatures.
 fn white(curves: &Curves, temperature: usize) -> DVec3 {
     let response = |channel: usize| {
         response_to_d65(|nm| {

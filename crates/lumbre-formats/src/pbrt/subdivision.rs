@@ -1,8 +1,8 @@
 //! Loop subdivision: smooth surfaces from triangles, with their limit positions and normals.
 //!
-//! C. Loop, "Smooth subdivision surfaces based on triangles", master's thesis, University of Utah, 1987; limit positions
-//! and tangents after H. Hoppe et al., "Piecewise smooth surface reconstruction", SIGGRAPH 1994. The weights of the rings
-//! are those of J. Warren, as pbrt has them: 3/16 for three neighbours, else 3/(8n).
+//! C. Loop, "Smooth subdivision surfaces based on triangles", master's thesis, University of Utah, 1987; limit
+//! positions and tangents after H. Hoppe et al., "Piecewise smooth surface reconstruction", SIGGRAPH 1994. The weights
+//! of the rings are those of J. Warren, as pbrt has them: 3/16 for three neighbours, else 3/(8n).
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};

@@ -30,10 +30,10 @@ use values::{Binary, Fault, Source, Text};
 ///
 /// Of vertices: `x y z`, normals `nx ny nz`, texture coordinates (`u v`, `s t`, `texture_u texture_v`,
 /// `texture_s texture_t`) and colours (`red green blue`, integers in sRGB, others linear). Of faces:
-/// `vertex_indices` (or `vertex_index`), `face_indices`, `texcoord`, two texture coordinates for each corner, as MeshLab writes
-/// them, and colours, unless vertices have them: a vertex with several of these is kept several times. Of `tristrips`: `vertex_indices`, where -1 begins a
-/// new strip. Other elements and properties are ignored. Convex quadrilaterals are kept; other polygons are
-/// triangulated.
+/// `vertex_indices` (or `vertex_index`), `face_indices`, `texcoord`, two texture coordinates for each corner, as
+/// MeshLab writes them, and colours, unless vertices have them: a vertex with several of these is kept several times.
+/// Of `tristrips`: `vertex_indices`, where -1 begins a new strip. Other elements and properties are ignored. Convex
+/// quadrilaterals are kept; other polygons are triangulated.
 ///
 /// # Errors
 /// [`FormatError::Input`] with the line and column, or the byte and the element's path such as `/vertex/3/x`;
@@ -271,7 +271,8 @@ fn colour_of(value: f64, number: Number) -> f32 {
     if number.is_float() { value as f32 } else { srgb_to_linear((value / number.one()) as f32) }
 }
 
-/// What faces say of their corners. A vertex has the values of the first corner that comes to it; for others it is copied.
+/// What faces say of their corners. A vertex has the values of the first corner that comes to it; for others it is
+/// copied.
 #[derive(Debug)]
 struct Corners {
     /// Vertices of the file; what comes after them are copies.
@@ -596,7 +597,8 @@ impl<'a> Mesh<'a> {
         Ok(self.flaws.push(Flaw { vertex: vertex as u32, at, what })?)
     }
 
-    /// Says what is not finite: a warning where a face that has an area uses it, or where vertices are points; else a note.
+    /// Says what is not finite: a warning where a face that has an area uses it, or where vertices are points; else a
+    /// note.
     fn say_flaws(&mut self) -> Result<(), FormatError> {
         if self.flaws.is_empty() {
             return Ok(());
@@ -779,8 +781,8 @@ impl<'a> Mesh<'a> {
         Ok(())
     }
 
-    /// The properties that are the colour of a face, or a warning where they are not used: vertices come first, and edges
-    /// have no colours of their own.
+    /// The properties that are the colour of a face, or a warning where they are not used: vertices come first, and
+    /// edges have no colours of their own.
     fn colours_of(&mut self, element: &Element) -> Option<[usize; 3]> {
         let find = |c: usize| {
             let is_channel = |p: &Property| p.list.is_none() && Slot::of(&p.name) == Slot::Colour(c);
@@ -799,8 +801,8 @@ impl<'a> Mesh<'a> {
         None
     }
 
-    /// Gives the corners of a face, which are vertices of the file, their texture coordinates and the colour of the face:
-    /// vertices that have others already become copies.
+    /// Gives the corners of a face, which are vertices of the file, their texture coordinates and the colour of the
+    /// face: vertices that have others already become copies.
     fn set_corners(
         &mut self,
         corners: &mut [i64],

@@ -1,4 +1,5 @@
-//! Any bytes are the buffer of a glTF: vertices, indices, sparse elements and joints, and the data of each decompressor.
+//! Any bytes are the buffer of a glTF: vertices, indices, sparse elements and joints, and the data of each
+//! decompressor.
 
 use std::path::Path;
 

@@ -1,5 +1,6 @@
-//! glTF: the bytes of a primitive compressed by Draco, under accessors that fit what they start with. What is taken is a mesh
-//! with the numbers of vertices and triangles that the accessors give, and scenes can be built of it; what is refused is the primitive.
+//! glTF: the bytes of a primitive compressed by Draco, under accessors that fit what they start with. What is taken is
+//! a mesh with the numbers of vertices and triangles that the accessors give, and scenes can be built of it; what is
+//! refused is the primitive.
 
 use std::collections::HashSet;
 

@@ -1,6 +1,6 @@
-//! glTF: the bytes of a compressed buffer view, of any mode, filter, stride and count. What is taken is all there: vertices as
-//! many as there should be, colours that are shares, corners of triangles that are vertices; and what the older extension takes the
-//! newer one takes for the same. What is refused is the buffer view, or what it has.
+//! glTF: the bytes of a compressed buffer view, of any mode, filter, stride and count. What is taken is all there:
+//! vertices as many as there should be, colours that are shares, corners of triangles that are vertices; and what the
+//! older extension takes the newer one takes for the same. What is refused is the buffer view, or what it has.
 
 use std::collections::HashSet;
 

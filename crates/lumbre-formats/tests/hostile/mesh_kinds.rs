@@ -1,5 +1,5 @@
-//! A mesh is the same in every kind of file that can hold it: text and binary PLY in both byte orders, OBJ, and as triangles of their
-//! own text and binary STL.
+//! A mesh is the same in every kind of file that can hold it: text and binary PLY in both byte orders, OBJ, and as
+//! triangles of their own text and binary STL.
 
 use std::fmt::Write as _;
 
@@ -99,7 +99,8 @@ fn stl(mesh: &Mesh, is_text: bool) -> Vec<u8> {
     out
 }
 
-/// The corners of all triangles, which no merging or leaving out of vertices changes; a zero is a zero whatever its sign.
+/// The corners of all triangles, which no merging or leaving out of vertices changes; a zero is a zero whatever its
+/// sign.
 fn triangles<'m>(meshes: impl IntoIterator<Item = &'m MeshDesc>, origin: DVec3) -> Vec<[[u64; 3]; 3]> {
     let place = |p: &Vec3| (origin + p.as_dvec3()).to_array().map(|x| (x + 0.0).to_bits());
     let of_mesh = |mesh: &'m MeshDesc| {

@@ -1,5 +1,5 @@
-//! Any bytes are a scene or an error at a place of it, and what a scene says does not change when it is printed in another form:
-//! a token a line, without comments, its numbers as the shortest decimal ones or in hexadecimal.
+//! Any bytes are a scene or an error at a place of it, and what a scene says does not change when it is printed in
+//! another form: a token a line, without comments, its numbers as the shortest decimal ones or in hexadecimal.
 
 use lumbre_formats::{Budget, Diagnostics, Limits, pbrt};
 

@@ -105,8 +105,8 @@ impl Csg {
     }
 }
 
-/// Why a crossing alone changes nothing: the first of the operands that, if it were entered or left, would let it; `None` where
-/// it does change whether the line is inside the result.
+/// Why a crossing alone changes nothing: the first of the operands that, if it were entered or left, would let it;
+/// `None` where it does change whether the line is inside the result.
 fn obstacle(membership: &mut Membership, event: &Event, leaves: usize) -> Option<Fate> {
     let was_inside = membership.contains(0);
     let decides = |membership: &mut Membership| {

@@ -26,8 +26,8 @@ pub enum Fate {
     },
     /// It is above or below the heights between which the surface is kept.
     OutsideHeights {
-        /// Its height: along z from the centre of a sphere, along z for a paraboloid, along the axis from the first end for a
-        /// cylinder, cone or capsule.
+        /// Its height: along z from the centre of a sphere, along z for a paraboloid, along the axis from the first end
+        /// for a cylinder, cone or capsule.
         z: f64,
         /// The least height, which may be infinite.
         min: f64,

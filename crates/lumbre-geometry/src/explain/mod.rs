@@ -1,4 +1,5 @@
-//! What a search computes for a ray, as data: the steps with their formulas and numbers, and what became of each crossing.
+//! What a search computes for a ray, as data: the steps with their formulas and numbers, and what became of each
+//! crossing.
 
 mod axial;
 mod capsule;
@@ -29,9 +30,9 @@ pub use topic::Topic;
 
 /// How a shape's crossings with a ray are found, in the order in which it is computed.
 ///
-/// All numbers are those of the search itself. Formulas are plain text in Unicode (`h = D·w`, `Δ = h² − a·c`), whose symbols are
-/// those of the quantities before, and of the ray: `O` its origin, `D` its direction. Where a symbol is used for more than one
-/// quantity, it is that of the last one before.
+/// All numbers are those of the search itself. Formulas are plain text in Unicode (`h = D·w`, `Δ = h² − a·c`), whose
+/// symbols are those of the quantities before, and of the ray: `O` its origin, `D` its direction. Where a symbol is
+/// used for more than one quantity, it is that of the last one before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explanation {
     /// What is computed.
@@ -49,8 +50,8 @@ pub struct Operand {
     pub name: &'static str,
     /// From the operand's own space to that of the tree.
     pub world_from_object: Transform,
-    /// How its crossings with the whole line are found, in its own space; `None` for a solid that is not one of Lumbre's shapes,
-    /// and for an operand whose box the ray misses, which the search does not look at.
+    /// How its crossings with the whole line are found, in its own space; `None` for a solid that is not one of
+    /// Lumbre's shapes, and for an operand whose box the ray misses, which the search does not look at.
     pub explanation: Option<Explanation>,
 }
 
@@ -72,14 +73,15 @@ pub struct Quantity {
     pub symbol: Cow<'static, str>,
     /// The formula in earlier symbols; empty for what is given, or chosen.
     ///
-    /// It consists of symbols (a Latin or Greek letter, or the word `det`, then primes `′` and subscripts), numerals, the
-    /// operators `·` (of numbers, or the dot product), `×` (the cross product), `+`, `−`, `/`, the squares `²`, `√( )`, `min( )`
-    /// and `max( )` with commas, lengths and absolute values `| |`, parentheses, and `⟨ , , ⟩`, the vector of three components.
+    /// It consists of symbols (a Latin or Greek letter, or the word `det`, then primes `′` and subscripts), numerals,
+    /// the operators `·` (of numbers, or the dot product), `×` (the cross product), `+`, `−`, `/`, the squares `²`, `√(
+    /// )`, `min( )` and `max( )` with commas, lengths and absolute values `| |`, parentheses, and `⟨ , , ⟩`, the vector
+    /// of three components.
     pub formula: Cow<'static, str>,
     /// What the search computed.
     pub value: Value,
-    /// The textbook's formula and what it gives, where that is another formula. It may begin with a name of its own, as in
-    /// `b = 2·(w·D)`, which later formulas of the textbook use.
+    /// The textbook's formula and what it gives, where that is another formula. It may begin with a name of its own, as
+    /// in `b = 2·(w·D)`, which later formulas of the textbook use.
     pub schoolbook: Option<(Cow<'static, str>, Value)>,
 }
 

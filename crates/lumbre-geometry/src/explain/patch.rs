@@ -106,8 +106,8 @@ impl BilinearPatch {
     }
 }
 
-/// The crossings of the surface that continues the patch, given the rulings that meet the line. One that is outside by rounding
-/// alone, if at all, is the patch's own.
+/// The crossings of the surface that continues the patch, given the rulings that meet the line. One that is outside by
+/// rounding alone, if at all, is the patch's own.
 fn roots_outside(patch: &Sheared, rulings: Option<(f64, f64)>) -> Vec<DVec2> {
     let Some((first, second)) = rulings else {
         return vec![];

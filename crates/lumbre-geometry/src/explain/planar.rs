@@ -10,8 +10,8 @@ use crate::line::{exact_plane_products, plane_crossing, plane_products};
 use crate::support::azimuth;
 use crate::{Disk, Plane, Ray};
 
-/// Explains where a line crosses the plane through `point`, called `names[0]`, perpendicular to `normal`, called `names[1]`: the
-/// parameter, or `None` where it is parallel.
+/// Explains where a line crosses the plane through `point`, called `names[0]`, perpendicular to `normal`, called
+/// `names[1]`: the parameter, or `None` where it is parallel.
 pub(super) fn tell_plane(
     notes: &mut Notes,
     topic: Topic,

@@ -49,7 +49,8 @@ pub(super) fn at_place(formula: &'static str, start: f64) -> String {
     if start == 0.0 { formula.to_owned() } else { formula.replace('W', "W₀") }
 }
 
-/// Explains where an equation is set up; `formula` and `w` are of the ray's origin, and `place` of the point at `start`.
+/// Explains where an equation is set up; `formula` and `w` are of the ray's origin, and `place` of the point at
+/// `start`.
 pub(super) fn tell_place(notes: &mut Notes, formula: &'static str, w: DVec3, start: f64, place: DVec3) {
     let step = notes.step(Topic::SetUp);
     step.vector("W", formula, w);
@@ -59,7 +60,8 @@ pub(super) fn tell_place(notes: &mut Notes, formula: &'static str, w: DVec3, sta
     }
 }
 
-/// Adds both crossings of a surface as candidates, which are hits where they are in the ray's range and nothing `excludes` them.
+/// Adds both crossings of a surface as candidates, which are hits where they are in the ray's range and nothing
+/// `excludes` them.
 pub(super) fn tell_pair(
     notes: &mut Notes,
     ray: &Ray,

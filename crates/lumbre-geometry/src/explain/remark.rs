@@ -33,13 +33,14 @@ pub enum Remark {
     AlongGenerator,
     /// The line passes the tip of a cone: both roots are one.
     ThroughTip,
-    /// The equation is set up elsewhere than at the ray's origin, where fewer of its digits cancel: in the middle of the roots, or
-    /// where the line is nearest to the shape.
+    /// The equation is set up elsewhere than at the ray's origin, where fewer of its digits cancel: in the middle of
+    /// the roots, or where the line is nearest to the shape.
     SetUpNearby {
         /// The ray parameter there, `t₀`.
         start: f64,
     },
-    /// Doubles do not prove how many roots there are, or would not keep their digits: it was computed in twice the precision.
+    /// Doubles do not prove how many roots there are, or would not keep their digits: it was computed in twice the
+    /// precision.
     TwicePrecision,
     /// The textbook's formula loses digits here.
     Cancellation {
@@ -57,7 +58,8 @@ pub enum Remark {
         /// How many roots the textbook's equation has.
         roots: usize,
     },
-    /// The line runs along a ruling of a bilinear patch: it is in the patch between the places where it enters and leaves it.
+    /// The line runs along a ruling of a bilinear patch: it is in the patch between the places where it enters and
+    /// leaves it.
     AlongRuling,
     /// Every ruling of one family meets the line: it is a ruling of the other family.
     EveryRuling,
@@ -84,7 +86,8 @@ pub enum Remark {
         /// Its place among the leaves, from 0.
         operand: usize,
     },
-    /// The ray misses the box of an operand, or what is known of another makes it needless: the search does not look at it.
+    /// The ray misses the box of an operand, or what is known of another makes it needless: the search does not look at
+    /// it.
     NotLookedAt {
         /// Its place among the leaves, from 0.
         operand: usize,

@@ -32,8 +32,8 @@ pub(super) fn tell_shear(
     }
 }
 
-/// Says of edges between sheared points where two products are the same number: the rounding errors of both decide, or the line
-/// meets the edge.
+/// Says of edges between sheared points where two products are the same number: the rounding errors of both decide, or
+/// the line meets the edge.
 pub(super) fn tell_edges<const N: usize>(step: &mut Step, edges: [[DVec3; 2]; N]) {
     let mut equal = edges.iter().filter(|[p, q]| p.x * q.y == p.y * q.x);
     let is_on = |[p, q]: &&[DVec3; 2]| dop(p.x, q.y, p.y, q.x) == 0.0;

@@ -18,7 +18,8 @@ pub trait Integrator: Debug + Send + Sync {
         false
     }
 
-    /// Whether all pixels choose the same wavelengths for samples of the same index, in a spectral render of this scene.
+    /// Whether all pixels choose the same wavelengths for samples of the same index, in a spectral render of this
+    /// scene.
     fn shares_wavelengths(&self, _scene: &Scene) -> bool {
         false
     }

@@ -181,7 +181,8 @@ impl<'s> Tracer<'s> {
         sum
     }
 
-    /// The light of layers, the bottom first, with what is left of it on the way from there. Mirrors are not dimmed by that.
+    /// The light of layers, the bottom first, with what is left of it on the way from there. Mirrors are not dimmed by
+    /// that.
     #[allow(clippy::too_many_arguments, reason = "layers are seen by a ray, from inside or outside")]
     fn stack(
         &self,

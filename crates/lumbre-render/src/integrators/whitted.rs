@@ -175,8 +175,8 @@ fn add_light<'s>(
     let sample = to.reachable(sample);
     let mut sum = Spectrum::BLACK;
     let mut shadow_ray = None;
-    // Through panes light goes straight on, of any light, since nothing else finds light behind a pane. That is known at
-    // once; otherwise a shadow ray tells.
+    // Through panes light goes straight on, of any light, since nothing else finds light behind a pane. That is known
+    // at once; otherwise a shadow ray tells.
     let goes_straight_on = scene.has_delta_transmission();
     for (share, vertex) in scatterers {
         let scattered = vertex.eval(sample.towards) * *share;

@@ -1,10 +1,11 @@
 //! A clear sky and the sun.
 //!
-//! The sky is that of L. Hosek and A. Wilkie, "An Analytic Model for Full Spectral Sky-Dome Radiance", ACM Transactions on
-//! Graphics 31(4) (SIGGRAPH), 2012: a formula whose coefficients depend on the height of the sun, the turbidity of the air and
-//! the reflectance of the ground. `hosek-wilkie.bin` holds the authors' coefficients for linear Rec. 709, under the licence
-//! beside it: single precision, little-endian; for each channel 9 × 6 × 10 × 2 numbers of the formula, then 6 × 10 × 2 of the
-//! radiance, by coefficient, control point, turbidity and reflectance, the first fastest.
+//! The sky is that of L. Hosek and A. Wilkie, "An Analytic Model for Full Spectral Sky-Dome Radiance", ACM Transactions
+//! on Graphics 31(4) (SIGGRAPH), 2012: a formula whose coefficients depend on the height of the sun, the turbidity of
+//! the air and the reflectance of the ground. `hosek-wilkie.bin` holds the authors' coefficients for linear Rec. 709,
+//! under the licence beside it: single precision, little-endian; for each channel 9 × 6 × 10 × 2 numbers of the
+//! formula, then 6 × 10 × 2 of the radiance, by coefficient, control point, turbidity and reflectance, the first
+//! fastest.
 //!
 //! Radiance is in units in which a white surface shows 1 where 100,000 lux light it: 1 is a luminance of 31,831 cd/m².
 
@@ -91,8 +92,8 @@ impl Sky {
         })
     }
 
-    /// The radiance from a unit direction. From below the horizon it is that of level ground of the sky's albedo under the sky
-    /// alone.
+    /// The radiance from a unit direction. From below the horizon it is that of level ground of the sky's albedo under
+    /// the sky alone.
     pub fn radiance(&self, direction: DVec3) -> Rgb {
         if direction.z < 0.0 {
             return self.ground;
@@ -137,8 +138,8 @@ impl Sky {
     }
 }
 
-/// The unit vector towards an azimuth in degrees clockwise from north (y; east is x), and an elevation in degrees above the
-/// horizon (z is up).
+/// The unit vector towards an azimuth in degrees clockwise from north (y; east is x), and an elevation in degrees above
+/// the horizon (z is up).
 pub fn sun_direction(azimuth: f64, elevation: f64) -> DVec3 {
     let ((east, north), (up, level)) =
         (azimuth.to_radians().sine_cosine(), elevation.to_radians().sine_cosine());
@@ -172,7 +173,8 @@ impl Channel {
     }
 }
 
-/// A coefficient from a table: linear in turbidity and reflectance, a Bézier curve over the cube root of the height of the sun.
+/// A coefficient from a table: linear in turbidity and reflectance, a Bézier curve over the cube root of the height of
+/// the sun.
 fn interpolated(table: &[f32], stride: usize, at: usize, conditions: &SkyConditions, height: f64) -> f64 {
     let low = (conditions.turbidity as usize).clamp(1, TURBIDITIES);
     let high = (low + 1).min(TURBIDITIES);

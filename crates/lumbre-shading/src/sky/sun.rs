@@ -12,8 +12,8 @@ use crate::spectrum::{LightCurve, luminance_of};
 pub(super) const UNIT: f64 = 100_000.0 / std::f64::consts::PI;
 /// Luminous efficacy, in lm/W.
 pub(super) const EFFICACY: f64 = 683.0;
-/// The temperature of the sun in kelvin, of which its disc is a black body: A. Prša and others, "Nominal Values for Selected
-/// Solar and Planetary Quantities: IAU 2015 Resolution B3", 2016.
+/// The temperature of the sun in kelvin, of which its disc is a black body: A. Prša and others, "Nominal Values for
+/// Selected Solar and Planetary Quantities: IAU 2015 Resolution B3", 2016.
 const TEMPERATURE: f64 = 5772.0;
 /// The thickness of the ozone layer in cm.
 const OZONE: f64 = 0.35;
@@ -79,8 +79,8 @@ const STEP: u32 = 5;
 
 /// The light of the sun's disc where it reaches the ground, on a surface that faces it.
 ///
-/// A black body through clear air: the optical depths of molecules, aerosols and ozone of A. J. Preetham, P. Shirley and B.
-/// Smits, "A Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix 1.
+/// A black body through clear air: the optical depths of molecules, aerosols and ozone of A. J. Preetham, P. Shirley
+/// and B. Smits, "A Practical Analytic Model for Daylight", SIGGRAPH 1999, appendix 1.
 #[derive(Clone, Debug)]
 pub struct Sunlight {
     /// The irradiance, in the unit of [`crate::sky`] times steradians: π is 100,000 lux.
@@ -93,8 +93,8 @@ impl Sunlight {
     /// The diameter of the sun in degrees, seen from the earth at its mean distance.
     pub const ANGLE: f64 = 0.533;
 
-    /// The light of a sun at this height above the horizon in degrees, through air of this turbidity; `None` if the air lets none
-    /// through.
+    /// The light of a sun at this height above the horizon in degrees, through air of this turbidity; `None` if the air
+    /// lets none through.
     pub fn new(elevation: f64, turbidity: f64) -> Option<Self> {
         let depth = |nm: f64| optical_depth(nm, elevation, turbidity);
         let radiance = |nm: f64| black_body(nm) * (-depth(nm)).exponential();

@@ -201,8 +201,8 @@ fn observe(mut value: impl FnMut(f64) -> f64) -> [f64; 3] {
     xyz
 }
 
-/// The luminance of a spectrum of radiance per nm, without luminous efficacy: its integral over ȳ; `None` for a colour, and for
-/// what is dark.
+/// The luminance of a spectrum of radiance per nm, without luminous efficacy: its integral over ȳ; `None` for a colour,
+/// and for what is dark.
 pub(crate) fn luminance_of(spectrum: &SpectrumValue) -> Option<f64> {
     spectrum.at(FIRST_NM)?;
     let [_, luminance, _] = observe(|nm| spectrum.at(nm).unwrap_or(0.0));

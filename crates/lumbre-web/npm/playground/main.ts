@@ -1,8 +1,9 @@
 // The playground: a scene is edited, seen while it is rendered, explained, and shared by a link.
-import { LumbreError, type Problem, type SceneFiles } from "../src/types.js";
+import { LumbreError, type Pass, type Problem, type SceneFiles } from "../src/types.js";
 import { Renderer } from "../src/renderer.js";
 import { hasCamera, moved } from "./camera.js";
-import { type Shared, fragment, fromBase64, fromFragment, unpacked } from "./share.js";
+import { NotLoaded, module, script } from "./loading.js";
+import { type Shared, fragment, fromBase64, fromFragment } from "./share.js";
 import { type Language, type Word, speak, spoken, word } from "./words.js";
 
 declare const WORKER: string;
@@ -18,7 +19,6 @@ const FIRST_EXAMPLE = "cornell";
 const EXAMPLES = ["cornell", "glass", "shapes", "csg", "capsule", "still-life", "motion", "mesh", "field"];
 /** Milliseconds after the last key until the scene is read. */
 const TYPED = 350;
-const WASM_MOST = 64 << 20;
 
 /** Files besides the text, by path. */
 let files: SceneFiles = {};
@@ -43,33 +43,9 @@ function say(name: Word, ...parts: (string | number)[]): void {
 
 // --- Scripts of the folder, which a page that is opened from a file may load too.
 
-function script(path: string): Promise<void> {
-  return new Promise((done, failed) => {
-    const element = document.createElement("script");
-    element.src = path;
-    element.onload = () => (element.remove(), done());
-    element.onerror = () => failed(new Error(path));
-    document.head.append(element);
-  });
-}
-
 const given = window as unknown as {
-  lumbreWasm: (base64: string) => void;
   lumbreExample: (name: string, files: Record<string, string>) => void;
 };
-
-async function module(): Promise<ArrayBuffer> {
-  if (location.protocol !== "file:") {
-    const answer = await fetch("lumbre.wasm");
-    if (!answer.ok) throw new Error(word("no module", answer.status));
-    return answer.arrayBuffer();
-  }
-  let packed = "";
-  given.lumbreWasm = (base64) => (packed = base64);
-  await script("lumbre.wasm.js").catch(() => {});
-  if (!packed) throw new Error(word("no script"));
-  return (await unpacked(fromBase64(packed), "gzip", WASM_MOST)).buffer;
-}
 
 async function load(name: string): Promise<SceneFiles> {
   let loaded: SceneFiles | undefined;
@@ -131,8 +107,13 @@ function list(): void {
 
 // --- Rendering.
 
-const toProblem = (error: unknown): Problem =>
-  error instanceof LumbreError ? error.problem : { kind: "crash", message: error instanceof Error ? error.message : String(error) };
+function toProblem(error: unknown): Problem {
+  if (error instanceof LumbreError) return error.problem;
+  if (error instanceof NotLoaded) {
+    return { kind: "files", message: error.why === "script" ? word("no script") : word("no module", error.why) };
+  }
+  return { kind: "crash", message: error instanceof Error ? error.message : String(error) };
+}
 
 let busy = false;
 let again = false;
@@ -195,14 +176,14 @@ function bound(): void {
   }
 }
 
-function show(pass: { size: [number, number]; spp: number; target: number; stride: number; done: boolean }, pixels: Uint8ClampedArray<ArrayBuffer>): void {
+function show(pass: Pass, pixels: Uint8ClampedArray<ArrayBuffer>): void {
   const [width, height] = pass.size;
-  if (pixels.length !== 4 * width * height) return;
+  const [x0, y0, x1, y1] = pass.bounds;
   if (canvas.width !== width || canvas.height !== height) {
     [canvas.width, canvas.height] = [width, height];
     fit();
   }
-  context.putImageData(new ImageData(pixels, width, height), 0, 0);
+  context.putImageData(new ImageData(pixels, x1 - x0, y1 - y0), x0, y0);
   state.passes++;
   state.done = pass.done;
   if (wrong) return;
@@ -490,14 +471,13 @@ async function start(): Promise<void> {
   examples.append(new Option(word("own"), ""), ...EXAMPLES.map((name) => new Option(name, name)));
   language(navigator.language.startsWith("es") ? "es" : "en");
   say("loading");
-  const wasm = module();
-  wasm.catch(() => {});
+  const compiled = module("");
+  compiled.catch(() => {});
   const taken = await fromLink();
   if (taken === undefined) await choose(FIRST_EXAMPLE);
   try {
-    const compiled = await WebAssembly.compile(await wasm);
     renderer = new Renderer({
-      wasm: compiled,
+      wasm: await compiled,
       worker: () => new Worker(URL.createObjectURL(new Blob([WORKER], { type: "text/javascript" }))),
       onPass: show,
       onProblem: (error) => tell(error.problem),

@@ -74,12 +74,25 @@ export class Scene {
     this.warnings = inner.warnings;
   }
 
+  /** Whether rows may be rendered apart: not where the picture is denoised, which has to be whole. */
+  get isDivisible(): boolean {
+    return this.#inner.isDivisible;
+  }
+
+  /**
+   * Renders these rows alone, the first and that beyond the last, so that several modules share a picture. What was rendered is given up.
+   * @throws {LumbreError} where there are no such rows.
+   */
+  limitRows(from: number, to: number): void {
+    this.#lumbre.call(() => this.#inner.limitRows(from, to));
+  }
+
   /** Renders on for about so many milliseconds. The finished picture does not depend on how the time is cut. */
   step(milliseconds: number): Pass {
     return this.#lumbre.call(() => JSON.parse(this.#inner.step(milliseconds)) as Pass);
   }
 
-  /** The picture so far: red, green, blue (sRGB) and alpha of each pixel, row by row from the top. */
+  /** What is rendered of the picture, the `bounds` of a pass: red, green, blue (sRGB) and alpha of each pixel, row by row from the top. */
   pixels(): Uint8Array {
     return this.#lumbre.call(() => this.#inner.pixels());
   }

@@ -5,6 +5,8 @@ declare module "lumbre-glue" {
     readonly width: number;
     readonly height: number;
     readonly warnings: string[];
+    readonly isDivisible: boolean;
+    limitRows(from: number, to: number): void;
     step(milliseconds: number): string;
     pixels(): Uint8Array;
     cast(list: Uint8Array, query: string): string;

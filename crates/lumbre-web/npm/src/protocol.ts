@@ -5,6 +5,8 @@ export type ToWorker =
   | { type: "load"; wasm: ArrayBuffer | WebAssembly.Module }
   | { type: "open"; id: number; files: SceneFiles; name: string; wanted: Wanted }
   | { type: "stop" }
+  | { type: "look"; id: number; files: SceneFiles; name: string; wanted: Wanted; explain: Explained }
+  | { type: "aim"; id: number; files: SceneFiles; name: string; list: Uint8Array | string; query: Query }
   | { type: "explain"; id: number; wanted: Explained }
   | { type: "cast"; id: number; list: Uint8Array | string; query: Query }
   | { type: "math"; id: number; text: string; lang: "en" | "es"; json: boolean };

@@ -51,6 +51,16 @@ export class Renderer {
     return this.#ask({ type: "explain", wanted });
   }
 
+  /** What `lumbre explain` says of a scene, which is opened for it and not rendered; its warnings come first. */
+  explainOf(files: SceneFiles, name: string, wanted: Wanted, explain: Explained): Promise<string> {
+    return this.#ask({ type: "look", files, name, wanted, explain });
+  }
+
+  /** What `lumbre cast` prints for a scene, which is opened for it and not rendered; its warnings come first. */
+  castInto(files: SceneFiles, name: string, list: Uint8Array | string, query: Query = "closest"): Promise<string> {
+    return this.#ask({ type: "aim", files, name, list, query });
+  }
+
   /** What rays hit, or what is at points: what `lumbre cast` prints. */
   cast(list: Uint8Array | string, query: Query = "closest"): Promise<string> {
     return this.#ask({ type: "cast", list, query });

@@ -44,6 +44,8 @@ export interface Wanted {
 export interface Pass {
   /** Width and height in pixels. */
   size: [number, number];
+  /** The part of it that is rendered: the first column and row, and those beyond the last. */
+  bounds: [number, number, number, number];
   /** Samples of each pixel. */
   spp: number;
   /** Those that there will be. */

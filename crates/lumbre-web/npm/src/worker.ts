@@ -1,7 +1,7 @@
 // Lumbre on a thread of its own: it renders in short steps, and listens between them.
 import { Lumbre, type Scene } from "./core.js";
 import type { FromWorker, ToWorker } from "./protocol.js";
-import { LumbreError, type Problem } from "./types.js";
+import { LumbreError, type Problem, type SceneFiles, type Wanted } from "./types.js";
 
 /** Milliseconds of the first step, and of the longest. */
 const FIRST = 40;
@@ -14,6 +14,29 @@ let lumbre: Promise<Lumbre> | undefined;
 let scene: Scene | undefined;
 /** The scene whose picture is rendered, by the message that opened it. */
 let rendered = 0;
+/** The scene that was asked last without being rendered, and what it was opened from. */
+let asked: { files: SceneFiles; name: string; wanted: string; scene: Scene } | undefined;
+
+const isSameFile = (a: Uint8Array | string | undefined, b: Uint8Array | string): boolean =>
+  typeof a === "object" && typeof b === "object" ? a.length === b.length && a.every((byte, i) => byte === b[i]) : a === b;
+
+const areSame = (a: SceneFiles, b: SceneFiles): boolean =>
+  Object.keys(a).length === Object.keys(b).length && Object.entries(b).every(([name, file]) => isSameFile(a[name], file));
+
+/** A scene that is only asked: opened again where it is another. */
+function only(ready: Lumbre, files: SceneFiles, name: string, size: Wanted): Scene {
+  const wanted = JSON.stringify(size);
+  if (asked?.name !== name || asked.wanted !== wanted || !areSame(asked.files, files)) {
+    const scene = ready.open(files, name, size);
+    asked?.scene.close();
+    asked = { files, name, wanted, scene };
+  }
+  return asked.scene;
+}
+
+/** What reading warned of; that there is no light is said of pictures alone. */
+const warned = (scene: Scene): string =>
+  scene.warnings.filter((line) => !line.endsWith(": the scene has no light, its picture is black")).map((line) => `${line}\n`).join("");
 
 function problem(error: unknown): Problem {
   return error instanceof LumbreError ? error.problem : { kind: "crash", message: String(error) };
@@ -69,6 +92,14 @@ self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
         say({ type: "opened", id, width, height, warnings });
         void render(id, opened);
         return;
+      }
+      case "look": {
+        const looked = only(ready, data.files, data.name, data.wanted);
+        return say({ type: "answer", id, text: warned(looked) + looked.explain(data.explain) });
+      }
+      case "aim": {
+        const aimed = only(ready, data.files, data.name, {});
+        return say({ type: "answer", id, text: warned(aimed) + aimed.cast(data.list, data.query) });
       }
       case "math":
         return say({ type: "answer", id, text: ready.math(data.text, data) });

@@ -2,22 +2,18 @@
 // screenshots are left there.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { createReadStream, existsSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
-import { createServer } from "node:http";
+import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
-import { dirname, extname, join, normalize, resolve } from "node:path";
+import { dirname, join, resolve } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
-import { chromium } from "playwright-core";
+import { all, asked, finds, site } from "./site.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const root = join(here, "../../../..");
 const program = process.env.LUMBRE ?? join(root, "target/debug/lumbre");
-const executablePath = process.env.CHROMIUM ?? "/usr/bin/chromium";
 const folder = resolve(process.env.PLAYGROUND ?? join(root, "target/web/playground"));
-const pictures = process.argv.includes("--pictures") ? process.argv[process.argv.indexOf("--pictures") + 1] : undefined;
-const axe = readFileSync(join(here, "../node_modules/axe-core/axe.min.js"), "utf8");
+const { pictures, only } = asked(process.argv.slice(2));
 const temporary = mkdtempSync(join(tmpdir(), "lumbre-playground-"));
-const WAIT = 120_000;
 
 const SCENE = `LookAt 1 -7 3  0 0 0.5  0 0 1
 Camera "perspective" "float fov" 35
@@ -30,28 +26,9 @@ NamedMaterial "<img src=x onerror=evil()>"
 Shape "sphere" "float radius" 1.25
 `;
 
-const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml", ".wasm": "application/wasm" };
-const server = createServer((request, response) => {
-  const path = join(folder, normalize(decodeURIComponent(new URL(request.url, "http://localhost").pathname)));
-  const file = path.endsWith("/") ? join(path, "index.html") : path;
-  if (!file.startsWith(folder) || !existsSync(file) || !statSync(file).isFile()) return response.writeHead(404).end();
-  response.writeHead(200, { "content-type": TYPES[extname(file)] ?? "application/octet-stream" });
-  createReadStream(file).pipe(response);
-});
-await new Promise((done) => server.listen(0, "127.0.0.1", done));
-const address = `http://127.0.0.1:${server.address().port}/`;
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
-const wrong = [];
-
+const { address, wrong, open: visit, close } = await site(folder);
 async function open(url = address, settings = {}) {
-  const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...settings });
-  const page = await context.newPage();
-  page.setDefaultTimeout(WAIT);
-  page.on("pageerror", (error) => wrong.push(error.message));
-  page.on("request", (request) => {
-    if (!/^(blob:|data:)/.test(request.url()) && !request.url().startsWith(address) && !request.url().startsWith("file:")) wrong.push(request.url());
-  });
-  await page.goto(url);
+  const page = await visit(url, settings);
   await page.waitForFunction(() => playground.passes > 0 || playground.wrong);
   return page;
 }
@@ -80,13 +57,6 @@ function native(text, ...words) {
   const path = join(temporary, "scene.pbrt");
   writeFileSync(path, text);
   return execFileSync(program, ["explain", path, ...words], { encoding: "utf8", stdio: ["ignore", "pipe", "ignore"] });
-}
-async function finds(page, what) {
-  await page.evaluate(axe);
-  // Frames that run nothing are looked at by themselves.
-  const { violations } = await page.evaluate(() => axe.run(document, { iframes: false, runOnly: ["wcag2a", "wcag2aa", "wcag21aa", "best-practice"] }));
-  const told = violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.html).join(" ")}`);
-  assert.deepEqual(told, [], `axe finds something in ${what}`);
 }
 const shot = async (page, name) => pictures && page.screenshot({ path: join(pictures, `${name}.png`) });
 
@@ -291,16 +261,8 @@ const tests = {
 };
 
 try {
-  const only = process.argv.slice(2).find((word, i, words) => !word.startsWith("--") && words[i - 1] !== "--pictures");
-  for (const [name, test] of Object.entries(tests)) {
-    if (only && !name.includes(only)) continue;
-    const start = performance.now();
-    await test();
-    assert.deepEqual(wrong, [], name);
-    console.log(`ok ${name} (${((performance.now() - start) / 1000).toFixed(1)} s)`);
-  }
+  await all(tests, wrong, only);
 } finally {
-  await browser.close();
-  server.close();
+  await close();
   rmSync(temporary, { recursive: true, force: true });
 }

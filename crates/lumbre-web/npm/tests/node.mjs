@@ -57,6 +57,27 @@ const tests = {
     }
   },
 
+  "rows that modules render apart make up the picture"() {
+    const { files, main } = scene("glass");
+    const open = () => lumbre.open(files, main, { size: SIZE, spp: 2 });
+    const whole = open();
+    const expected = rendered(whole);
+    whole.close();
+    const parts = [[0, 10], [10, 36]].map(([from, to]) => {
+      const part = open();
+      assert.equal(part.isDivisible, true);
+      part.limitRows(from, to);
+      const pixels = rendered(part);
+      assert.deepEqual(part.step(1).bounds, [0, from, SIZE[0], to]);
+      part.close();
+      return pixels;
+    });
+    assert.ok(Buffer.concat(parts).equals(Buffer.from(expected)));
+    const none = open();
+    assert.throws(() => none.limitRows(36, 40), LumbreError);
+    none.close();
+  },
+
   "explanations of every scene are those of the program, to the byte"() {
     for (const name of names) {
       const { files, main, path } = scene(name);

@@ -28,8 +28,8 @@ struct Frame<'b> {
     is_top: bool,
 }
 
-/// What was read by includes. A short scene may have a long file read any number of times, as a short compressed one may
-/// unpack to a long one, and it is held to the same limit.
+/// What was read by includes. A short scene may have a long file read any number of times, as a short compressed one
+/// may unpack to a long one, and it is held to the same limit.
 #[derive(Debug, Default)]
 struct Included {
     files: HashSet<PathBuf>,

@@ -1,7 +1,8 @@
 //! The spectral sensitivities of cameras, and the matrices that make CIE XYZ of what they record.
 //!
-//! Sensitivities from PhysLight, by Anders Langlands and Luca Fascione, which are licensed under the Apache License, Version 2.0
-//! (<https://www.apache.org/licenses/LICENSE-2.0>). "Physlight: An End-to-End Pipeline for Scene-Referred Lighting", SIGGRAPH 2020 Talks.
+//! Sensitivities from PhysLight, by Anders Langlands and Luca Fascione, which are licensed under the Apache License,
+//! Version 2.0 (<https://www.apache.org/licenses/LICENSE-2.0>). "Physlight: An End-to-End Pipeline for Scene-Referred
+//! Lighting", SIGGRAPH 2020 Talks.
 
 /// The first wavelength of [`Curves::rgb`] in nm, and the step between them.
 pub(super) const FIRST_NM: f64 = 380.0;
@@ -15,7 +16,8 @@ pub(super) struct Curves {
     pub(super) name: &'static str,
     /// The sensitivities of red, green and blue, from 380 to 720 nm; the ends go on.
     pub(super) rgb: [[f32; 35]; 3],
-    /// By rows, XYZ of red, green and blue, for light of each temperature: least squares over a set of common reflectances.
+    /// By rows, XYZ of red, green and blue, for light of each temperature: least squares over a set of common
+    /// reflectances.
     pub(super) xyz: [[f32; 9]; 5],
 }
 
