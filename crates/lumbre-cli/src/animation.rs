@@ -177,7 +177,7 @@ impl Video {
         }
         let written = self.pixels.as_mut().map_or(Ok(()), |pipe| pipe.write_all(pixels));
         // What ffmpeg has to say of it comes with its end.
-        written.or_else(|e| Err(self.end().err().unwrap_or(e)))
+        written.map_err(|e| self.end().err().unwrap_or(e))
     }
 
     /// Waits for ffmpeg.

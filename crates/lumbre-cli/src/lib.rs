@@ -130,7 +130,8 @@ pub use memory::{check_picture, memory_left};
 #[command(
     override_usage = "lumbre SCENE… [OPTIONS]      a picture of it, as lumbre render\n       lumbre <COMMAND> …"
 )]
-#[command(mut_subcommand("view", without_turntable), mut_subcommand("explain", without_turntable))]
+#[command(mut_subcommand("view", without_turntable))]
+#[command(mut_subcommand("explain", |command| without_turntable(command)))]
 #[command(after_help = "Examples:
   lumbre model.glb                              a picture of a model: without a command, files are rendered
   lumbre render scene.pbrt                      a picture under the scene's own film name

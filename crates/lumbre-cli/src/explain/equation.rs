@@ -2,6 +2,8 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use lumbre::math::Elementary;
+
 /// Whether a formula of numbers gives what is written as its result; `None` where that cannot be said, as of matrices.
 /// Colours are multiplied component by component, while `·` of two vectors is their dot product.
 pub(super) fn holds(formula: &str, result: &str, of_colours: bool) -> Option<bool> {
@@ -45,7 +47,7 @@ impl Twofold {
     /// The product of two doubles, without error.
     fn product(a: f64, b: f64) -> Self {
         let high = a * b;
-        Self { high, low: a.mul_add(b, -high) }
+        Self { high, low: a.multiply_add(b, -high) }
     }
 
     fn sqrt(self) -> Self {

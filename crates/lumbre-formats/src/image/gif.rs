@@ -4,6 +4,7 @@ use std::io;
 
 use ::gif::{Encoder, Frame, Repeat};
 use lumbre_image::Image;
+use lumbre_math::Elementary;
 
 use super::{WriteOptions, rgb8};
 
@@ -58,7 +59,7 @@ impl GifWriter {
         let (width, height) = (image.width() as u16, image.height() as u16);
         let mut frame = Frame::from_rgb_speed(width, height, &rgb8(image, options), SPEED);
         // Times are rounded to hundredths so that the whole is as long as it should be.
-        let time = |frames: u32| (100.0 * f64::from(frames) / self.frames_per_second).round();
+        let time = |frames: u32| (100.0 * f64::from(frames) / self.frames_per_second).rounded();
         let delay = time(self.count + 1) - time(self.count);
         // A cast from a float saturates.
         frame.delay = (delay as u16).max(MIN_DELAY);

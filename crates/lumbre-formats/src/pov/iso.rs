@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
 use lumbre_image::{Bitmap, Channels, PixelData};
-use lumbre_math::DVec3;
+use lumbre_math::{DVec3, Elementary};
 use lumbre_shading::pov::Function;
 
 use super::heights::{Heights, LEVELS};
@@ -324,12 +324,12 @@ impl Parser<'_, '_> {
 fn level(bitmap: &Bitmap, x: u32, y: u32, is_png: bool) -> f32 {
     let stored = bitmap.stored(x, y, 0);
     if !matches!(bitmap.channels(), Channels::Y | Channels::Ya) {
-        return (stored * 255.0).round() * 256.0 + (bitmap.stored(x, y, 1) * 255.0).round();
+        return (stored * 255.0).rounded() * 256.0 + (bitmap.stored(x, y, 1) * 255.0).rounded();
     }
     if is_png && matches!(bitmap.data(), PixelData::U8(_)) {
         // POV-Ray weighs the three equal channels of such a pixel in single precision, and drops what is behind the point.
         let gray = 255.0 * (0.297_f32 * stored + 0.589_f32 * stored + 0.114_f32 * stored);
         return gray.floor() * 257.0;
     }
-    (stored * (LEVELS as f32 - 1.0)).round()
+    (stored * (LEVELS as f32 - 1.0)).rounded()
 }

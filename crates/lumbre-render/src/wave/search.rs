@@ -97,8 +97,7 @@ impl Hits {
     fn pass_through(&mut self, scene: &Scene, paths: &Paths, slots: &Slots<'_>, is_seen: bool) {
         for path in 0..paths.len {
             let id = self.columns.id[path];
-            if id == HitColumns::MISS || !scene.may_be_cutout(id) && !(is_seen && scene.may_be_one_sided(id))
-            {
+            if id == HitColumns::MISS || !(scene.may_be_cutout(id) || is_seen && scene.may_be_one_sided(id)) {
                 continue;
             }
             let ray = paths.ray(path, slots.time[paths.slot[path] as usize]);
