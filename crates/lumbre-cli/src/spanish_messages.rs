@@ -158,6 +158,13 @@ const SENTENCES: &[(&str, &str)] = &[
     ("there is no {}", "no existe {}"),
     ("{} has no parameter {}", "{} no tiene el parámetro {}"),
     ("no environment map", "no es un mapa de entorno"),
+    ("no date with a time and its zone", "no es una fecha con hora y zona"),
+    (
+        "the sun is below the horizon, and the night has no model",
+        "el sol está bajo el horizonte, y la noche no tiene modelo",
+    ),
+    ("the turbidity is out of range", "la turbiedad está fuera de su intervalo"),
+    ("a sky has both {} and {}: give one of them", "un cielo tiene {} y {}: dé solo uno"),
 ];
 
 /// What was found or expected, in both languages; others are names, numbers and quotations, which are the same in both.
@@ -168,6 +175,10 @@ const DETAILS: &[(&str, &str)] = &[
     ("a number from {} up", "un número de {} en adelante"),
     ("a number above 0", "un número mayor que 0"),
     ("a number", "un número"),
+    ("a whole number", "un número entero"),
+    ("one as {}", "una como {}"),
+    ("an elevation of {} degrees", "una elevación de {} grados"),
+    ("from {}, clear, to {}, hazy", "de {}, claro, a {}, brumoso"),
     ("more than {} and less than {} degrees", "más de {} y menos de {} grados"),
     ("more than {}", "más de {}"),
     ("less than {}", "menos de {}"),

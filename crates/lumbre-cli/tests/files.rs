@@ -147,7 +147,10 @@ fn a_default_name_gives_way_to_a_texture_of_that_name() {
     for scene in scenes {
         let (code, said) = render(&folder, &[scene]);
         assert_eq!(code, 0, "{said}");
-        assert!(said.contains("is an input") && said.contains("the picture is chair.render.png"), "{said}");
+        assert!(
+            said.contains("is an input") && said.contains("the picture is saved as chair.render.png"),
+            "{said}"
+        );
         assert_eq!(bytes(&folder, &READ), before, "{scene}");
         // A picture of Lumbre's own is replaced, which is said.
         let (code, said) = render(&folder, &[scene]);

@@ -826,9 +826,9 @@ fn words_that_show_nothing_are_refused_before_anything_is_read() {
         (&["--ground", "floor"][..], "shadow"),
         (&["--background", "wite"], "transparent"),
         (&["--background", "#12"], "hexadecimal"),
-        (&["--background", "transparent", "-o", "a.jpg"], ".png or .exr"),
+        (&["--background", "transparent", "-o", "a.jpg"], "expected .png, .webp, .qoi or .exr"),
         (&["--turntable", "8", "-o", "a.png"], "frame.####.png"),
-        (&["--turntable", "1"], "2..=100000"),
+        (&["--turntable", "1"], "expected a whole number from 2 to 100000"),
         (&["--fit", "--camera", "0"], "cannot be used with"),
         (&["--turntable", "8", "--camera", "0"], "cannot be used with"),
     ] {

@@ -67,7 +67,7 @@ fn a_terminal_shows_the_picture_and_what_is_none_is_refused() {
     }
     let out = desk.lumbre(&["render", "scene.pbrt", "-o", "b.png", "--preview"]);
     assert_eq!(code(&out), 2);
-    assert!(stderr(&out).contains("no terminal"), "{}", stderr(&out));
+    assert!(stderr(&out).contains("is not a terminal"), "{}", stderr(&out));
 }
 
 #[test]

@@ -168,7 +168,7 @@ fn every_mode_makes_the_triangles_that_the_specification_says() {
 #[test]
 fn points_and_lines_are_spheres_and_cylinders() {
     let spheres = |scene: &SceneDesc| {
-        let is = |s: &&ShapeDesc| matches!(&s.geometry, GeometryDesc::Exact(exact) if matches!(**exact, Shape::Sphere(_)));
+        let is = |s: &&ShapeDesc| matches!(&s.geometry, GeometryDesc::Exact(exact) if matches!(*exact, Shape::Sphere(_)));
         scene.shapes.iter().filter(is).count()
     };
     // Spheres stand where a line goes on.

@@ -348,13 +348,13 @@ fn vertices_without_faces_are_points_and_edges_are_lines() {
     let spheres = scene
         .shapes
         .iter()
-        .all(|s| matches!(&s.geometry, GeometryDesc::Exact(exact) if matches!(**exact, Shape::Sphere(_))));
+        .all(|s| matches!(&s.geometry, GeometryDesc::Exact(exact) if matches!(*exact, Shape::Sphere(_))));
     assert!(spheres);
     let (scene, said) = open_text(&format!(
         "ply\nformat ascii 1.0\nelement vertex 3\n{PLACES}element edge 2\nproperty int vertex1\nproperty int vertex2\n\
          end_header\n{vertices}0 1\n1 2\n"
     ));
-    let is_line = |s: &ShapeDesc| matches!(&s.geometry, GeometryDesc::Exact(exact) if matches!(**exact, Shape::Cylinder(_)));
+    let is_line = |s: &ShapeDesc| matches!(&s.geometry, GeometryDesc::Exact(exact) if matches!(*exact, Shape::Cylinder(_)));
     assert_eq!((scene.shapes.iter().filter(|s| is_line(s)).count(), said.len()), (2, 0));
     Scene::build(scene).unwrap();
 }

@@ -221,7 +221,7 @@ impl SceneRequest {
             Around::Own => add("env", "none".to_owned()),
             Around::Studio => add("env", "studio".to_owned()),
             Around::Map(map) => add("env", format!("map {}", hash(&map.image))),
-            Around::Sky(sky) => add("env", format!("sky {:?}", sky.desc())),
+            Around::Sky(sky) => add("env", format!("sky {}", lumbre::in_words(sky.desc()))),
             Around::Light(light) => match light.bare() {
                 LightDesc::Infinite { world_from_light, radiance, image } => {
                     let image = image.as_ref().map_or_else(String::new, |map| hash(&map.image));

@@ -378,7 +378,7 @@ impl Builder {
         let area_light = if is_csg { None } else { self.wanted_light(&desc, &entry) };
         match desc.geometry {
             GeometryDesc::Exact(shape) => {
-                let placed = PlacedShape::new(*shape, desc.world_from_object);
+                let placed = PlacedShape::new(shape, desc.world_from_object);
                 self.exact(entry, placed, area_light, standing, geometries)?;
             }
             GeometryDesc::Coloured(coloured) => {

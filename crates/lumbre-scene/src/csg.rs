@@ -108,7 +108,7 @@ fn solid(
         Ok(leaf)
     };
     match desc.geometry {
-        GeometryDesc::Exact(exact) => leaf(entry, *exact),
+        GeometryDesc::Exact(exact) => leaf(entry, exact),
         GeometryDesc::Coloured(coloured) => {
             entry.form = Form::Coloured(Box::new(ColourRamp::new(&coloured, &placement)));
             leaf(entry, coloured.shape)

@@ -139,8 +139,8 @@ pub struct Boundary {
 /// The geometry of a shape.
 #[derive(Clone, Debug)]
 pub enum GeometryDesc {
-    /// One exact shape; boxed, since meshes are smaller and most shapes of a large scene.
-    Exact(Box<Shape>),
+    /// One exact shape.
+    Exact(Shape),
     /// An exact shape with colours.
     Coloured(Box<ColouredShape>),
     /// Triangles and quads.
@@ -158,7 +158,7 @@ pub enum GeometryDesc {
 impl GeometryDesc {
     /// One exact shape.
     pub fn exact(shape: impl Into<Shape>) -> Self {
-        Self::Exact(Box::new(shape.into()))
+        Self::Exact(shape.into())
     }
 
     /// The name of its kind, in the scene language if that has one; `mesh` for the several ways to write a mesh.

@@ -107,7 +107,7 @@ fn rays_that_leave_a_flat_or_convex_surface_never_meet_it_again() {
     for geometry in geometries {
         // The inside of a paraboloid is hollow: only the outer side is convex.
         let is_hollow =
-            matches!(&geometry, GeometryDesc::Exact(exact) if matches!(**exact, Shape::Paraboloid(_)));
+            matches!(&geometry, GeometryDesc::Exact(exact) if matches!(*exact, Shape::Paraboloid(_)));
         check_leaving(&geometry, is_hollow);
     }
 }

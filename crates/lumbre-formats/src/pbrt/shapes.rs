@@ -113,7 +113,7 @@ impl Converter<'_, '_> {
         let boxed = match &form.geometry {
             GeometryDesc::Exact(shape) => {
                 size_of::<Shape>()
-                    + if matches!(**shape, Shape::Quadric(_)) { size_of::<Quadric>() } else { 0 }
+                    + if matches!(*shape, Shape::Quadric(_)) { size_of::<Quadric>() } else { 0 }
             }
             GeometryDesc::Mesh(_) | GeometryDesc::BilinearMesh(_) => size_of::<MeshDesc>(),
             _ => 0,

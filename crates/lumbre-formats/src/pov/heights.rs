@@ -176,7 +176,9 @@ impl Heights {
         for axis in 0..3 {
             let (o, d) = (ray.origin[axis], ray.direction[axis]);
             if d == 0.0 {
-                if !(min[axis] <= o && o <= max[axis]) {
+                // A border belongs to the cell behind it, or a ray along it would cross twice.
+                let is_inside = o < max[axis] || o == max[axis] && (level > 0 || axis == 1 || o == 1.0);
+                if o < min[axis] || !is_inside {
                     return None;
                 }
                 continue;
