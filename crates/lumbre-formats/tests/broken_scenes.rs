@@ -718,10 +718,7 @@ fn files_that_are_not_there_are_errors_where_they_are_asked_for() {
     let cases = [
         ("WorldBegin\n Include \"gone.pbrt\"", "2:10: gone.pbrt: cannot open"),
         ("WorldBegin\n Include \".\"", "2:10: {folder}/.: cannot read"),
-        (
-            "WorldBegin Shape \"plymesh\" \"string filename\" \"gone.ply\"",
-            "1:28: gone.ply: cannot open",
-        ),
+        ("WorldBegin Shape \"plymesh\" \"string filename\" \"gone.ply\"", "1:28: gone.ply: cannot open"),
         (
             "WorldBegin Texture \"t\" \"float\" \"imagemap\" \"string filename\" \"gone.png\" Shape \"sphere\" \"texture alpha\" \"t\"",
             "1:43: gone.png: cannot open",
