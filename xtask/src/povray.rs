@@ -15,11 +15,11 @@ use crate::race::picture::Picture;
 /// Where Debian's package povray-examples puts them.
 const EXAMPLES: &str = "/usr/share/doc/povray/examples";
 /// Scenes whose pictures differ in more than this share of their pixels …
-const MOST_SHARE: f64 = 0.03;
+const MAX_SHARE: f64 = 0.03;
 /// … by more than this in a channel, do not agree, …
 const DIFFERENT: f64 = 0.03;
 /// … nor do those whose channels differ by more than this on average.
-const MOST_MEAN: f64 = 0.01;
+const MAX_MEAN: f64 = 0.01;
 /// Warnings that change nothing of a picture.
 const HARMLESS: [&str; 2] = ["the scene says", "the scene has no light"];
 
@@ -57,7 +57,7 @@ enum Agreement {
 
 impl Agreement {
     fn holds(&self) -> bool {
-        matches!(self, Self::Known { share, mean } if *share <= MOST_SHARE && *mean <= MOST_MEAN)
+        matches!(self, Self::Known { share, mean } if *share <= MAX_SHARE && *mean <= MAX_MEAN)
     }
 }
 

@@ -160,7 +160,7 @@ const CIRCLES: &[(&str, &[usize])] = &[
     ("lumbre-formats", &[12, 7, 6, 3, 2]),
     ("lumbre-math", &[4]),
     ("lumbre-render", &[5, 3, 3]),
-    ("lumbre-scene", &[34, 2]),
+    ("lumbre-scene", &[35, 2]),
     ("lumbre-shading", &[25, 5, 3]),
     ("lumbre-simd", &[2]),
     ("lumbre-viewer", &[2]),

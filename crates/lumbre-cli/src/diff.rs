@@ -172,7 +172,7 @@ mod tests {
     use super::shown_beyond;
 
     #[test]
-    fn a_difference_is_shown_with_enough_digits_to_be_beyond_its_limit() {
+    fn a_difference_has_enough_digits_to_be_beyond_its_limit() {
         assert_eq!(shown_beyond(0.079_123, |x| x > 0.001), "0.0791");
         assert_eq!(shown_beyond(0.079_123, |x| x > 0.0791), "0.07912");
         assert_eq!(shown_beyond(0.979_996, |x| x < 0.98), "0.979996");

@@ -23,6 +23,10 @@ const SENTENCES: &[(&str, &str)] = &[
     ("unknown kind of scene file", "tipo de archivo de escena desconocido"),
     ("unknown escape in a string", "secuencia de escape desconocida en un texto"),
     ("unsupported text encoding", "codificación de texto no admitida"),
+    (
+        "wrong value for parameter {}: no date with a time and its zone",
+        "valor incorrecto del parámetro {}: no es una fecha con hora y zona",
+    ),
     ("wrong value for parameter {}", "valor incorrecto del parámetro {}"),
     ("wrong type of parameter {}", "tipo incorrecto del parámetro {}"),
     ("wrong number of values for parameter {}", "número incorrecto de valores del parámetro {}"),
@@ -158,7 +162,6 @@ const SENTENCES: &[(&str, &str)] = &[
     ("there is no {}", "no existe {}"),
     ("{} has no parameter {}", "{} no tiene el parámetro {}"),
     ("no environment map", "no es un mapa de entorno"),
-    ("no date with a time and its zone", "no es una fecha con hora y zona"),
     (
         "the sun is below the horizon, and the night has no model",
         "el sol está bajo el horizonte, y la noche no tiene modelo",

@@ -629,7 +629,7 @@ fn without_equations(section: &Value) -> Value {
 }
 
 #[test]
-fn a_symbol_has_one_meaning_on_a_page_and_is_defined_before_it_is_used() {
+fn a_symbol_has_one_meaning_and_is_defined_before_its_use() {
     let desk = Desk::new();
     let glass = r#"Material "dielectric""#;
     let lamp = r#"LightSource "point" "point3 from" [0 3 -5] AttributeBegin AreaLightSource "diffuse" Translate 3 3 -4

@@ -271,7 +271,7 @@ fn without_anything_specular_wavelengths_are_those_of_paths() {
 }
 
 #[test]
-fn wavelengths_shared_by_all_pixels_have_the_mean_of_those_of_each() {
+fn shared_wavelengths_have_the_mean_of_those_of_each_pixel() {
     // A small mirror has the photons look for light, of which there is hardly any.
     let small = Disk::new(DVec3::new(9.0, 9.0, 0.1), DVec3::Z, 0.01, 0.0).unwrap();
     let desc = with(coloured(), mirror(0.9), small);
@@ -281,7 +281,7 @@ fn wavelengths_shared_by_all_pixels_have_the_mean_of_those_of_each() {
 }
 
 #[test]
-fn photons_of_wavelengths_find_what_paths_find_through_glass_that_disperses() {
+fn photons_find_what_paths_find_through_dispersive_glass() {
     let mut desc = lit_by_a_large_lamp();
     // The ball; the floor gets a colour.
     let ball = desc.shapes[2].material.unwrap();
@@ -295,7 +295,7 @@ fn photons_of_wavelengths_find_what_paths_find_through_glass_that_disperses() {
 }
 
 #[test]
-fn a_lamp_in_the_middle_of_a_ball_that_disperses_shines_as_it_does_without() {
+fn a_lamp_in_a_dispersive_ball_shines_as_it_does_without() {
     let at = DVec3::new(0.3, 0.1, 3.0);
     let desc = floor(vec![lamp(at)]);
     let ball = with(desc.clone(), dispersive(), Sphere::new(at, 0.5).unwrap());
@@ -304,7 +304,7 @@ fn a_lamp_in_the_middle_of_a_ball_that_disperses_shines_as_it_does_without() {
 }
 
 #[test]
-fn a_caustic_seen_through_the_glass_that_made_it_counts_its_wavelength_once() {
+fn a_caustic_seen_through_glass_counts_its_wavelength_once() {
     // A lamp in a ball that disperses, seen from the middle of a second such ball: the photons and the camera's paths
     // are both of the hero wavelength alone. Light crosses both balls straight, so that the floor is lit as without.
     let at = DVec3::new(0.3, 0.1, 3.0);

@@ -119,7 +119,7 @@ impl Target {
         Ok(command)
     }
 
-    /// What cargo is told to build for; cargo-zigbuild is told of the glibc as well.
+    /// The target that cargo builds for; cargo-zigbuild also gets the version of glibc.
     fn named_for(&self, is_zig: bool) -> String {
         let has_glibc = is_zig && self.triple.ends_with("linux-gnu");
         if has_glibc { format!("{}.{GLIBC}", self.triple) } else { self.triple.to_owned() }

@@ -293,11 +293,11 @@ mod tests {
                 assert!([0.2, 0.4, 0.6, 0.8].iter().all(|share| side(*share) == side(0.1)), "{i}");
             }
         }
-        assert!(crossings > 150, "{crossings}");
+        assert!(crossings > 50, "{crossings}");
     }
 
     #[test]
-    fn rays_straight_down_meet_the_height_and_nothing_below_the_water() {
+    fn rays_straight_down_meet_the_height_or_the_water() {
         let (field, wet) = (hills(false, 0.0), hills(false, 0.6));
         let mut drowned = 0;
         for i in 0..200_u32 {

@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn shared_wavelengths_of_a_power_of_two_of_samples_are_equally_spaced() {
+    fn shared_wavelengths_of_two_to_the_n_are_equally_spaced() {
         let sampler = |seed, kind| Sampler::new(&SamplerDesc { kind, spp: None, seed });
         let numbers = |seed, kind, count| {
             let mut all: Vec<f32> = (0..count).map(|i| sampler(seed, kind).shared_wavelengths(i)).collect();

@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn sunlight_is_weaker_and_redder_the_lower_the_sun_and_the_hazier_the_air() {
+    fn low_sun_and_hazy_air_make_sunlight_weaker_and_redder() {
         assert!((80_000.0..110_000.0).contains(&lux(60.0, 2.0)), "{}", lux(60.0, 2.0));
         for (bright, dark) in
             [((60.0, 3.0), (30.0, 3.0)), ((30.0, 3.0), (5.0, 3.0)), ((30.0, 2.0), (30.0, 6.0))]
