@@ -189,6 +189,27 @@ fn refracting_glass_blocks_light_as_optics_predicts() {
     assert_eq!(alpha, 1.0);
 }
 
+#[test]
+fn focused_light_leaves_no_dark_pixels_when_denoised() {
+    // Most light is near the zenith, and the ball focuses it below itself: the shadow is negative there, with noise.
+    let row = |y: usize| if (6..26).contains(&y) { 0.2 } else { 5.0 };
+    let image = Image::from_pixels(64, 32, (0..64 * 32).map(|i| Rgb::splat(row(i / 64))).collect()).unwrap();
+    let light = LightDesc::Infinite {
+        world_from_light: Transform::rotate(DVec3::X, -90.0).unwrap(),
+        radiance: Rgb::WHITE,
+        image: EnvironmentDesc::of_image(Arc::new(image)),
+    };
+    let ball = exact(Sphere::new(DVec3::new(3.0, 4.0 + HEIGHT + RADIUS, -2.0), RADIUS).unwrap());
+    let kind = MaterialKind::Dielectric { eta: 1.5, roughness: Roughness::smooth() };
+    let scene = Scene::build(below(vec![light], kind, ball)).unwrap();
+    let noisy = changed(options(&scene, 24, 20, 4), |it| (it.transparent, it.guides) = (true, true));
+    let rendered = picture(&scene, &noisy);
+    let denoised = denoise(&rendered, 1).unwrap();
+    let largest = |image: &Image| image.alpha().unwrap().iter().copied().fold(0.0, f32::max);
+    let (before, after) = (largest(&rendered.image), largest(&denoised.image));
+    assert!(after <= before, "{before} -> {after}");
+}
+
 /// The coverage of each colour, and that of the picture.
 fn coverage_by_colour(desc: SceneDesc) -> (Option<Rgb>, f32) {
     let scene = Scene::build(desc).unwrap();
