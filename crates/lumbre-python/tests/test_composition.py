@@ -134,7 +134,7 @@ def test_an_expression_is_the_surface_where_it_is_zero() -> None:
         inside = implicit.inside([[0.5, -1.0, 3.0], [2.5, -1.0, 3.0]])
         np.testing.assert_array_equal(inside, exact.inside([[0.5, -1.0, 3.0], [2.5, -1.0, 3.0]]))
     for text, message in [
-        ("x +", "found the end of the file; expected a number, a name or a parenthesis"),
+        ("x +", "found its end; expected a number, a name or a parenthesis"),
         ("2x", 'found "x" at position 2; expected an operator'),
         ("x**0.3", "a whole exponent from -64 to 64, or 0.5"),
         ("w", 'no name "w"'),
