@@ -426,10 +426,6 @@ impl Part {
     }
 }
 
-/// An image file as (h, w, 3), linear light, and its alpha as (h, w) where it has one.
-///
-/// # Errors
-/// What is wrong with the file.
 /// A clear sky by longitude and latitude, (h, 2h, 3), without its sun at this azimuth and elevation; and the luminance
 /// of its zenith.
 #[pyfunction]
@@ -447,6 +443,10 @@ pub(crate) fn clear_sky(
     Ok((array(py, &py.detach(|| sky.map()))?, zenith))
 }
 
+/// An image file as (h, w, 3), linear light, and its alpha as (h, w) where it has one.
+///
+/// # Errors
+/// What is wrong with the file.
 #[pyfunction]
 pub(crate) fn read_image(py: Python<'_>, path: PathBuf) -> PyResult<Pixels> {
     let image = py.detach(|| lumbre::read_image(&path)).map_err(raised)?;

@@ -16,6 +16,7 @@ __all__ = [
     "read_image",
     "write_image",
     "main",
+    "clear_sky",
     "Scene",
     "Camera",
     "Environment",
@@ -190,6 +191,7 @@ class Picture:
     def pixels(self) -> npt.NDArray[np.float32]: ...
     def alpha(self) -> npt.NDArray[np.float32] | None: ...
     def feature(self, name: str) -> tuple[npt.NDArray[np.float32], int] | None: ...
+    def film(self) -> dict[str, npt.NDArray[np.float32]]: ...
     def save(
         self,
         path: str,
