@@ -11,7 +11,6 @@ use smallvec::SmallVec;
 /// Solids are identified by their materials, so that one made of several meshes may be entered by one and left by
 /// another. Only the innermost medium applies. At its surface, its index of refraction is relative to that of the solid
 /// around it. If solids overlap without one containing the other, the one that was entered last counts.
-/// the one that was entered last counts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MediumStack<'s> {
     around: SmallVec<[Solid<'s>; 2]>,

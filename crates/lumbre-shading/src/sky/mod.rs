@@ -266,7 +266,8 @@ mod tests {
             let turn = lumbre_math::direction_at(f64::from(i) * 2.4);
             let z = (f64::from(i) + 0.5) / 400.0;
             let across = (1.0 - z * z).sqrt();
-            assert!(at(DVec3::new(across * turn.x, across * turn.y, z)) < sun);
+            let direction = DVec3::new(across * turn.x, across * turn.y, z);
+            assert!(at(direction) < sun, "{direction}: {} {sun}", at(direction));
         }
         // East is x, and north y.
         assert!(sky.towards_sun().x > 0.0 && sky.towards_sun().y < 0.0);
