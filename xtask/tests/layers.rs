@@ -159,9 +159,9 @@ const CIRCLES: &[(&str, &[usize])] = &[
     ("lumbre-cli", &[8, 4]),
     ("lumbre-formats", &[12, 7, 6, 3, 2]),
     ("lumbre-math", &[4]),
-    ("lumbre-render", &[5, 3, 3]),
-    ("lumbre-scene", &[35, 2]),
-    ("lumbre-shading", &[25, 5, 3]),
+    ("lumbre-render", &[3, 3]),
+    ("lumbre-scene", &[3, 3, 2, 2, 2]),
+    ("lumbre-shading", &[21, 5]),
     ("lumbre-simd", &[2]),
     ("lumbre-viewer", &[2]),
 ];

@@ -137,11 +137,12 @@ fn only_what_stands_for_something_that_bulges_out_rises() {
             let met = scene.interaction(&ray, &hit, &Footprint::Point);
             assert_eq!(
                 met.has_terminator_offset(),
-                met.unoccluded_terminator_origin(&scene).is_some(),
+                scene.unoccluded_terminator_origin(&met).is_some(),
                 "{name}"
             );
             heights.extend(
-                met.unoccluded_terminator_origin(&scene)
+                scene
+                    .unoccluded_terminator_origin(&met)
                     .map(|origin| (origin - CENTER).length() / RADIUS - 1.0),
             );
         }

@@ -91,7 +91,7 @@ impl Job for Lanes<'_> {
                         R::from_slice(&q.u[2][at..]),
                         R::from_slice(&q.u[3][at..]),
                     ];
-                    let sample = lights.sample(scene, active, &receiver, u, Sampling::Mis);
+                    let sample = lights.sample(active, &receiver, u, Sampling::Mis);
                     sum = sum + (sample.pdf + sample.radiance.x + sample.towards.x).or_zero(sample.valid);
                 }
                 Work::Density { last } => {
@@ -100,7 +100,7 @@ impl Job for Lanes<'_> {
                     let primitive = (index * R::UInt::splat(97)) & R::UInt::splat(last);
                     let zero = R::UInt::splat(0);
                     let up = V3::new(R::Double::splat(0.3), R::Double::splat(0.2), R::Double::splat(4.0));
-                    sum = sum + lights.pdf(scene, active, &receiver, zero, primitive, from + up);
+                    sum = sum + lights.pdf(active, &receiver, zero, primitive, from + up);
                 }
                 Work::Escape => {
                     let direction = V3::new(
@@ -108,7 +108,7 @@ impl Job for Lanes<'_> {
                         R::from_slice(&q.direction[1][at..]),
                         R::from_slice(&q.direction[2][at..]),
                     );
-                    let (radiance, pdf) = lights.escaped(scene, 0, active, &receiver, direction);
+                    let (radiance, pdf) = lights.escaped(0, active, &receiver, direction);
                     sum = sum + radiance.x + pdf;
                 }
             }

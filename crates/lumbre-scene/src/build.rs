@@ -4,33 +4,29 @@ use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
 use lumbre_kernel::{Accel, BuildOptions, Geometry, GeometryKind, Placement, TriangleMesh};
-use lumbre_math::distribution::AliasTable;
 use lumbre_math::{DVec3, Elementary, Transform};
 use lumbre_shading::{Material, MaterialKind, Spectrum};
 
 use crate::freeing::freeing;
-use crate::light::choice::LightChoice;
 use crate::light::environment::first_not_finite;
-use crate::light::lanes::LaneLights;
 use crate::light::{
-    DiscLight, DistantLight, Environment, GoniometricLight, Light, LightId, MeshLight, MovingLight,
+    DiscLight, DistantLight, Environment, GoniometricLight, Light, Lighting, MeshLight, MovingLight,
     PlacedLight, PointLight, PortalLight, ProjectionLight, ShapeLight, SpotLight, UniformLight,
     portal::PortalError, power,
 };
 use crate::light_colour::LightColour;
 use crate::media::{self, Boundaries, Media};
 use crate::mesh::{self, QuadOrder};
+use crate::object_order::inside_out;
+use crate::placed_bounds::{mesh_bounds, moved, near};
 use crate::scene::SceneTraits;
 use crate::specular::Specular;
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
-    AreaLightDesc, BuildError, BuildWarning, Camera, CameraKind, Emission, FilmDesc, GeometryDesc,
-    GroundPlane, InstanceDesc, LightDesc, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, SurfaceTable,
-    csg, custom, extent, framing, ground, stage, studio,
+    AreaLightDesc, BuildError, BuildWarning, Camera, Emission, FilmDesc, GeometryDesc, GroundPlane,
+    InstanceDesc, LightDesc, LightId, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, SurfaceTable,
+    camera, csg, custom, extent, framing, ground, stage, studio,
 };
-
-/// The maximal depth of nested objects.
-const MAX_NESTING: usize = 64;
 
 impl Scene {
     /// Resolves a description: one tree of everything, and lights ready for sampling. A description without
@@ -66,7 +62,7 @@ impl Scene {
             pov,
             listing: _,
         } = desc;
-        check_cameras(&cameras)?;
+        camera::check(&cameras)?;
         let mut builder = Builder {
             materials: materials.into_iter().map(|named| named.material).collect(),
             ..Builder::default()
@@ -99,18 +95,14 @@ impl Scene {
         }
         builder.place_lights(lights)?;
         builder.entries.shrink_to_fit();
-        let lighting = Lighting::new(
-            std::mem::take(&mut builder.lights),
-            builder.light_colours,
-            &builder.entries,
-            &bounds,
-        );
-        let has_cutouts = builder.entries.iter().any(SurfaceEntry::has_cutouts);
-        let is_transmissive = builder.entries.iter().any(SurfaceEntry::is_transmissive);
-        let has_delta_transmission = builder.entries.iter().any(SurfaceEntry::has_delta_transmission);
-        let has_solids = builder.entries.iter().any(SurfaceEntry::may_be_solid);
-        let has_one_sided = builder.entries.iter().any(SurfaceEntry::is_one_sided_anywhere);
-        let is_textured = builder.entries.iter().any(SurfaceEntry::looks_up_anywhere);
+        let entries = Arc::new(builder.entries);
+        let lighting = Lighting::new(builder.lights, builder.light_colours, &entries, &bounds);
+        let has_cutouts = entries.iter().any(SurfaceEntry::has_cutouts);
+        let is_transmissive = entries.iter().any(SurfaceEntry::is_transmissive);
+        let has_delta_transmission = entries.iter().any(SurfaceEntry::has_delta_transmission);
+        let has_solids = entries.iter().any(SurfaceEntry::may_be_solid);
+        let has_one_sided = entries.iter().any(SurfaceEntry::is_one_sided_anywhere);
+        let is_textured = entries.iter().any(SurfaceEntry::looks_up_anywhere);
         Ok(Self {
             accel,
             cameras,
@@ -131,15 +123,10 @@ impl Scene {
                 is_textured,
             },
             specular_spheres: specular.spheres(&bounds),
-            ground: ground.map(|desc| GroundPlane::new(desc, &lighting.lights)),
-            lane_lights: lighting.lane_lights,
-            light_choice: lighting.light_choice,
-            light_by_power: lighting.light_by_power,
-            infinite: lighting.infinite,
-            lights: lighting.lights,
-            light_colours: lighting.light_colours,
-            tables: Arc::new(SurfaceTable::new(&builder.entries)),
-            entries: Arc::new(builder.entries),
+            ground: ground.map(|desc| GroundPlane::new(desc, lighting.lights())),
+            lighting,
+            tables: Arc::new(SurfaceTable::new(&entries)),
+            entries,
             media: Media {
                 media: if uses_media { media } else { vec![] },
                 boundaries: boundaries.map(Arc::new),
@@ -164,7 +151,7 @@ impl Scene {
         }
         cameras.iter().try_for_each(|camera| self.check_camera(camera))?;
         // Surfaces refer to their lights by index.
-        let surfaces = self.lights.iter().take_while(|light| light.is_surface()).cloned().collect();
+        let surfaces = self.lights().iter().take_while(|light| light.is_surface()).cloned().collect();
         let warnings = self.warnings.iter().filter(|warning| !warning.is_of_lights()).cloned().collect();
         let mut builder = Builder { lights: surfaces, warnings, ..Builder::default() };
         if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::is_emissive) {
@@ -174,18 +161,13 @@ impl Scene {
             self.traits.moves || lights.iter().any(|light| matches!(light.bare(), LightDesc::Moving { .. }));
         builder.place_lights(lights)?;
         let lighting = Lighting::new(builder.lights, builder.light_colours, &self.entries, &self.bounds);
-        let ground = self.ground.as_ref().map(|ground| GroundPlane::new(ground.desc(), &lighting.lights));
+        let ground = self.ground.as_ref().map(|ground| GroundPlane::new(ground.desc(), lighting.lights()));
         Ok(Self {
             accel: Arc::clone(&self.accel),
             entries: Arc::clone(&self.entries),
             tables: Arc::clone(&self.tables),
             media: self.media.clone(),
-            lights: lighting.lights,
-            light_colours: lighting.light_colours,
-            light_choice: lighting.light_choice,
-            lane_lights: lighting.lane_lights,
-            light_by_power: lighting.light_by_power,
-            infinite: lighting.infinite,
+            lighting,
             cameras,
             film,
             filter: self.filter,
@@ -203,34 +185,6 @@ impl Scene {
     /// Whether both scenes share one tree: one is [`Scene::relit`] from the other, or both are from a third.
     pub fn shares_tree(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.accel, &other.accel)
-    }
-}
-
-/// All lights of a scene, and the data for choosing among them.
-struct Lighting {
-    lights: Vec<Light>,
-    light_colours: Vec<LightColour>,
-    light_choice: LightChoice,
-    lane_lights: LaneLights,
-    light_by_power: Option<AliasTable>,
-    infinite: Vec<LightId>,
-}
-
-impl Lighting {
-    fn new(
-        lights: Vec<Light>,
-        light_colours: Vec<LightColour>,
-        entries: &[SurfaceEntry],
-        bounds: &Aabb,
-    ) -> Self {
-        let radius = if bounds.is_empty() { 1.0 } else { 0.5 * bounds.size().length() };
-        let powers: Vec<f64> = lights.iter().map(|light| light.power(radius)).collect();
-        let ids = (0..lights.len() as u32).map(LightId);
-        let infinite: Vec<LightId> = ids.filter(|id| lights[id.0 as usize].is_infinite()).collect();
-        let light_choice = LightChoice::new(&lights, entries, radius);
-        let lane_lights = LaneLights::new(&lights, entries, &light_choice, &infinite);
-        let light_by_power = AliasTable::new(&powers);
-        Self { lights, light_colours, light_choice, lane_lights, light_by_power, infinite }
     }
 }
 
@@ -811,59 +765,6 @@ pub(crate) fn emission(desc: AreaLightDesc, area: impl FnOnce() -> f64) -> Emiss
     emission
 }
 
-/// An order of building objects in which nested ones come first.
-pub(crate) fn inside_out(objects: &[ObjectDesc]) -> Result<Vec<usize>, BuildError> {
-    #[derive(Clone, Copy, PartialEq)]
-    enum Mark {
-        New,
-        Open,
-        Done,
-    }
-    let mut marks = vec![Mark::New; objects.len()];
-    let mut order = Vec::with_capacity(objects.len());
-    for start in 0..objects.len() {
-        // The objects being visited, with the position in each.
-        let mut open = vec![(start, 0)];
-        if marks[start] != Mark::New {
-            continue;
-        }
-        marks[start] = Mark::Open;
-        while let Some((object, next)) = open.last_mut() {
-            let Some(instance) = objects[*object].instances.get(*next) else {
-                marks[*object] = Mark::Done;
-                order.push(*object);
-                open.pop();
-                continue;
-            };
-            *next += 1;
-            let inner = instance.object.0 as usize;
-            match marks.get(inner) {
-                None => {
-                    return Err(BuildError::NoSuchObject { object: instance.object.0, count: objects.len() });
-                }
-                Some(Mark::Done) => {}
-                Some(Mark::Open) => {
-                    return Err(BuildError::ObjectCycle { name: objects[inner].name.clone() });
-                }
-                Some(Mark::New) => {
-                    marks[inner] = Mark::Open;
-                    open.push((inner, 0));
-                }
-            }
-        }
-    }
-    let mut depths = vec![0_usize; objects.len()];
-    for &object in &order {
-        let inner = objects[object].instances.iter().map(|i| depths[i.object.0 as usize] + 1);
-        depths[object] = inner.max().unwrap_or(0);
-        if depths[object] >= MAX_NESTING {
-            let name = objects[object].name.clone();
-            return Err(BuildError::NestedTooDeeply { name, limit: MAX_NESTING });
-        }
-    }
-    Ok(order)
-}
-
 /// An origin near all meshes and exact shapes, relative to which single precision suffices: zero where that is
 /// near enough, else a multiple of a power of two, so that translating a whole scene changes its vertices by no
 /// more than their rounding.
@@ -888,71 +789,4 @@ fn origin(shapes: &[ShapeDesc], instances: &[InstanceDesc], accels: &[Arc<Accel>
         }
     }
     near(&bounds)
-}
-
-/// The bounding box of a mesh under a transform.
-pub(crate) fn mesh_bounds(mesh: &MeshDesc, placement: &Transform) -> Aabb {
-    let corners = mesh.positions.iter().filter(|p| p.is_finite());
-    moved(&Aabb::around(corners.map(|p| p.as_dvec3())), placement)
-}
-
-/// The origin for a bounding box: see [`origin`].
-pub(crate) fn near(bounds: &Aabb) -> DVec3 {
-    let size = bounds.size().max_element();
-    if bounds.is_empty() || !size.is_finite() || size <= 0.0 {
-        return if bounds.is_empty() { DVec3::ZERO } else { finite_or_zero(bounds.center()) };
-    }
-    let grid = f64::powi(2.0, size.logarithm_2().ceil().clamp(-1000.0, 1000.0) as i32);
-    finite_or_zero((bounds.center() / grid).map(f64::rounded) * grid)
-}
-
-fn finite_or_zero(p: DVec3) -> DVec3 {
-    if p.is_finite() { p } else { DVec3::ZERO }
-}
-
-/// The bounding box of a box under a transform.
-pub(crate) fn moved(bounds: &Aabb, placement: &Transform) -> Aabb {
-    if bounds.is_empty() {
-        return *bounds;
-    }
-    let corners = (0..8).map(|i| {
-        let pick = |bit: usize| if i >> bit & 1 == 1 { bounds.max } else { bounds.min };
-        placement.point(DVec3::new(pick(0).x, pick(1).y, pick(2).z))
-    });
-    Aabb::around(corners)
-}
-
-pub(crate) fn check_cameras(cameras: &[Camera]) -> Result<(), BuildError> {
-    for (position, camera) in cameras.iter().enumerate() {
-        let wrong =
-            |parameter, found, expected| BuildError::Camera { camera: position, parameter, found, expected };
-        let lens = match camera.kind {
-            CameraKind::Perspective { fov, lens_radius, focal_distance } => {
-                if !(fov > 0.0 && fov < 180.0) {
-                    return Err(wrong("fov", fov, "more than 0 and less than 180 degrees"));
-                }
-                Some((lens_radius, focal_distance))
-            }
-            CameraKind::Orthographic { lens_radius, focal_distance } => Some((lens_radius, focal_distance)),
-            CameraKind::Spherical { .. } | CameraKind::Realistic(_) => None,
-        };
-        if let Some((radius, distance)) = lens {
-            if !(radius >= 0.0 && radius.is_finite()) {
-                return Err(wrong("lensradius", radius, "0 or more"));
-            }
-            if radius > 0.0 && !(distance > 0.0 && distance.is_finite()) {
-                return Err(wrong("focaldistance", distance, "more than 0"));
-            }
-        }
-        if let Some(aspect) = camera.frame_aspect.filter(|a| !(*a > 0.0 && a.is_finite())) {
-            return Err(wrong("frameaspectratio", aspect, "more than 0"));
-        }
-        if let Some([x0, x1, y0, y1]) = camera.screen_window {
-            let window = (x1 - x0) * (y1 - y0);
-            if !window.is_finite() || window == 0.0 {
-                return Err(wrong("screenwindow", window, "a window with an area"));
-            }
-        }
-    }
-    Ok(())
 }

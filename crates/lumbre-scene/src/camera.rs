@@ -11,7 +11,7 @@ use lumbre_math::{
 use lumbre_simd::{Double, Real, V3};
 
 use crate::viewpoint::half_window;
-use crate::{Footprint, Lens, MediumId};
+use crate::{BuildError, Footprint, Lens, MediumId};
 
 /// The mapping of directions to the picture of a spherical camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -534,6 +534,45 @@ fn through_lens(
     }
     let offset = (lens_radius * square_to_disk(lens)).extend(0.0);
     (center + offset, focal_distance * towards - offset)
+}
+
+/// Checks the parameters of cameras.
+///
+/// # Errors
+/// [`BuildError::Camera`], naming the camera and the parameter.
+pub(crate) fn check(cameras: &[Camera]) -> Result<(), BuildError> {
+    for (position, camera) in cameras.iter().enumerate() {
+        let wrong =
+            |parameter, found, expected| BuildError::Camera { camera: position, parameter, found, expected };
+        let lens = match camera.kind {
+            CameraKind::Perspective { fov, lens_radius, focal_distance } => {
+                if !(fov > 0.0 && fov < 180.0) {
+                    return Err(wrong("fov", fov, "more than 0 and less than 180 degrees"));
+                }
+                Some((lens_radius, focal_distance))
+            }
+            CameraKind::Orthographic { lens_radius, focal_distance } => Some((lens_radius, focal_distance)),
+            CameraKind::Spherical { .. } | CameraKind::Realistic(_) => None,
+        };
+        if let Some((radius, distance)) = lens {
+            if !(radius >= 0.0 && radius.is_finite()) {
+                return Err(wrong("lensradius", radius, "0 or more"));
+            }
+            if radius > 0.0 && !(distance > 0.0 && distance.is_finite()) {
+                return Err(wrong("focaldistance", distance, "more than 0"));
+            }
+        }
+        if let Some(aspect) = camera.frame_aspect.filter(|a| !(*a > 0.0 && a.is_finite())) {
+            return Err(wrong("frameaspectratio", aspect, "more than 0"));
+        }
+        if let Some([x0, x1, y0, y1]) = camera.screen_window {
+            let window = (x1 - x0) * (y1 - y0);
+            if !window.is_finite() || window == 0.0 {
+                return Err(wrong("screenwindow", window, "a window with an area"));
+            }
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]

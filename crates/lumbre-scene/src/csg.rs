@@ -2,30 +2,14 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{Csg, LeafPart, PlacedShape, Shape};
+use lumbre_geometry::{Csg, PlacedShape, Shape};
 use lumbre_math::Transform;
 
 use crate::build::{Builder, emission};
 use crate::mesh::QuadOrder;
 use crate::solid::MeshSolid;
-use crate::surface::{ColourRamp, Form, SurfaceEntry};
+use crate::surface::{ColourRamp, CsgForm, Form, SurfaceEntry};
 use crate::{BuildError, CsgDesc, CsgOperation, GeometryDesc, ShapeDesc, mesh};
-
-/// A CSG with the surface entry of each leaf.
-#[derive(Clone, Debug)]
-pub(crate) struct CsgForm {
-    pub csg: Csg,
-    /// In the order of the leaves.
-    pub leaves: Vec<SurfaceEntry>,
-}
-
-impl CsgForm {
-    /// The leaf that a root lies on.
-    pub(crate) fn leaf(&self, root: &lumbre_geometry::Root) -> Option<(&SurfaceEntry, LeafPart)> {
-        let part = self.csg.leaf_of(root)?;
-        Some((self.leaves.get(part.leaf)?, part))
-    }
-}
 
 /// Resolves a CSG in the space of its tree. `builder` provides the materials.
 ///
@@ -114,7 +98,7 @@ fn solid(
             leaf(entry, coloured.shape)
         }
         GeometryDesc::Mesh(mesh) => {
-            let origin = crate::build::near(&crate::build::mesh_bounds(&mesh, &placement));
+            let origin = crate::placed_bounds::near(&crate::placed_bounds::mesh_bounds(&mesh, &placement));
             // It is closed as it is written, and would not be with parts.
             let baked = mesh::bake(shape, mesh, &placement, origin, QuadOrder::Around, false)?;
             if !baked.patches.is_empty() {

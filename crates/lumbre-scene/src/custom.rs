@@ -6,7 +6,7 @@ use lumbre_geometry::{Aabb, NearestPoint, NearestPointError, Ray, Root, Roots, S
 use lumbre_kernel::CustomGeometry;
 use lumbre_math::{DVec3, Transform};
 
-use crate::build::moved;
+use crate::placed_bounds::moved;
 
 /// Geometry under a map.
 #[derive(Debug)]

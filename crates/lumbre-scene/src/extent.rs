@@ -9,7 +9,7 @@ use lumbre_geometry::Aabb;
 use lumbre_kernel::Placement;
 use lumbre_math::{DVec3, Elementary, Transform};
 
-use crate::build::inside_out;
+use crate::object_order::inside_out;
 use crate::{GeometryDesc, MeshDesc, ObjectDesc, SceneDesc, ShapeDesc, custom};
 
 /// Directions of an object's support points; what lies between them is missed by less than a hundredth of its
@@ -172,7 +172,7 @@ pub(crate) fn corners(bounds: &Aabb) -> impl Iterator<Item = DVec3> + use<> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::moved;
+    use crate::placed_bounds::moved;
     use crate::{InstanceDesc, MaterialId, ObjectId};
     use lumbre_geometry::Sphere;
     use lumbre_math::Vec3;

@@ -6,9 +6,10 @@ use lumbre_geometry::Plane;
 use lumbre_math::{DVec3, Transform};
 use lumbre_shading::{Material, MaterialKind, Spectrum, Texture};
 
-use crate::light::{Light, LightId};
+use crate::light::Light;
 use crate::{
-    BuildError, GeometryDesc, GroundDesc, Interaction, MaterialId, NamedMaterial, SceneDesc, ShapeDesc,
+    BuildError, GeometryDesc, GroundDesc, Interaction, LightId, MaterialId, NamedMaterial, SceneDesc,
+    ShapeDesc,
 };
 
 /// The shape index of the ground, which no shape of a file has.

@@ -11,3 +11,7 @@ pub struct MediumId(pub u32);
 /// An object of a [`crate::SceneDesc`], for instancing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ObjectId(pub u32);
+
+/// A light of a [`crate::Scene`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LightId(pub u32);

@@ -5,8 +5,7 @@ use lumbre_math::rounding::offset_point;
 use lumbre_math::{DVec3, Vec2};
 use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, ShadingNormals, Spectrum, TextureContext};
 
-use crate::light::{LightId, LightSample};
-use crate::{Boundary, Emission, Footprint, Scene};
+use crate::{Boundary, Emission, Footprint, LightId, LightSample};
 
 /// A ray's hit with everything that a path needs to continue.
 #[derive(Clone, Debug)]
@@ -82,7 +81,7 @@ impl<'s> Interaction<'s> {
     }
 
     /// The ray that leaves along a unit direction from another origin, such as
-    /// [`Interaction::unoccluded_terminator_origin`].
+    /// [`Scene::unoccluded_terminator_origin`].
     pub fn leave_from(&self, start: DVec3, direction: DVec3) -> Ray {
         Ray::new(start, direction).at_time(self.time)
     }
@@ -98,13 +97,6 @@ impl<'s> Interaction<'s> {
         let stop = offset_point(end.point, end.error, end.normal, -sample.towards);
         // The range allows for rounding of the direction and of t.
         Ray::new(start, stop - start).with_range(0.0, 1.0 - f64::powi(2.0, -40)).at_time(self.time)
-    }
-
-    /// [`Interaction::terminator_origin`], unless something lies between it and the face.
-    pub fn unoccluded_terminator_origin(&self, scene: &Scene) -> Option<DVec3> {
-        let terminator_offset = self.terminator_offset?;
-        let way = self.leave_from(self.incident_origin, terminator_offset).with_range(0.0, 1.0);
-        (!scene.is_occluded(&way)).then(|| self.incident_origin + terminator_offset)
     }
 
     /// The corresponding point on the smooth surface implied by the vertex normals, on the incident side: the face plus

@@ -8,6 +8,7 @@ mod delta;
 mod disc;
 pub(crate) mod environment;
 pub mod lanes;
+mod lighting;
 mod mesh;
 mod moving;
 mod pairs;
@@ -15,6 +16,7 @@ mod placed;
 pub(crate) mod portal;
 mod projection;
 mod rectangle;
+mod sample;
 mod tree;
 
 use lumbre_geometry::{Aabb, Ray, Surface};
@@ -27,20 +29,18 @@ pub use choice::Sampling;
 pub use delta::{DistantLight, GoniometricLight, PointLight, SpotLight};
 pub use disc::DiscLight;
 pub use environment::{Environment, UniformLight};
+pub(crate) use lighting::{LightSources, Lighting};
 pub use mesh::MeshLight;
 pub use moving::MovingLight;
 pub(crate) use moving::swept;
 pub use placed::PlacedLight;
 pub use portal::PortalLight;
 pub use projection::ProjectionLight;
+pub use sample::{LightPoint, LightSample};
 pub(crate) use tree::Place;
 use tree::{Emitter, Facing};
 
 use crate::surface::SurfaceEntry;
-
-/// A light of a [`crate::Scene`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LightId(pub u32);
 
 /// The kinds of light.
 #[derive(Clone, Debug)]
@@ -73,53 +73,6 @@ pub enum Light {
     Pov(std::sync::Arc<crate::pov::PovLight>),
     /// A moving point light, or a moving light in one direction.
     Moving(MovingLight),
-}
-
-/// Light that arrives at a point from a sampled direction.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightSample {
-    /// Unit, towards the light.
-    pub towards: DVec3,
-    /// Its source; `None` for a light at infinity.
-    pub end: Option<LightPoint>,
-    /// The radiance that arrives if unoccluded; for [`Scatter::Delta`], the irradiance on a surface perpendicular to
-    /// it.
-    pub radiance: Spectrum,
-    /// How the direction was chosen, per unit solid angle.
-    pub scatter: Scatter,
-}
-
-/// The end of a shadow ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LightPoint {
-    /// The point.
-    pub point: DVec3,
-    /// An error bound of each component; zero for exact points.
-    pub error: DVec3,
-    /// The normal there; zero without a surface.
-    pub normal: DVec3,
-}
-
-impl LightSample {
-    /// The sample with directions more likely by this factor: the density grows by it; the radiance of a delta light,
-    /// which includes the division by the density, shrinks.
-    fn of_density(mut self, factor: f64) -> Self {
-        match &mut self.scatter {
-            Scatter::Density(pdf) => *pdf *= factor as f32,
-            Scatter::Delta => self.radiance *= (1.0 / factor) as f32,
-        }
-        self
-    }
-}
-
-impl LightPoint {
-    fn on(surface: &Surface) -> Self {
-        Self { point: surface.point, error: surface.point_error, normal: surface.normal }
-    }
-
-    fn bare(point: DVec3) -> Self {
-        Self { point, error: DVec3::ZERO, normal: DVec3::ZERO }
-    }
 }
 
 impl Light {

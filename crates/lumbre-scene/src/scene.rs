@@ -4,22 +4,18 @@ use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Curves, Ray, Surface};
 use lumbre_kernel::{Accel, Hit, Query};
-use lumbre_math::distribution::AliasTable;
 use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
 use lumbre_math::{DVec2, DVec3, Transform};
 use lumbre_shading::{FloatTexture, Spectrum};
 
-use crate::build::check_cameras;
 use crate::footprint::SurfaceFootprint;
-use crate::light::choice::LightChoice;
 use crate::light::lanes::LaneLights;
-use crate::light::{Light, LightId, LightSample, Place, Sampling};
-use crate::light_colour::LightColour;
+use crate::light::{Light, LightSample, Lighting, Place, Sampling};
 use crate::media::Media;
 use crate::surface::{Form, ShadingGeometry, SurfaceEntry};
 use crate::{
     BoundingSphere, BuildError, Camera, FilmDesc, FilterDesc, Footprint, GroundPlane, IntegratorDesc,
-    Interaction, MediumId, SamplerDesc, SurfaceTable,
+    Interaction, LightId, MediumId, SamplerDesc, SurfaceTable, camera,
 };
 
 /// What a hit is on.
@@ -42,13 +38,7 @@ pub struct Scene {
     pub(crate) entries: Arc<Vec<SurfaceEntry>>,
     pub(crate) tables: Arc<SurfaceTable>,
     pub(crate) media: Media,
-    pub(crate) lights: Vec<Light>,
-    pub(crate) light_colours: Vec<LightColour>,
-    pub(crate) light_choice: LightChoice,
-    pub(crate) lane_lights: LaneLights,
-    // By power; `None` without lights.
-    pub(crate) light_by_power: Option<AliasTable>,
-    pub(crate) infinite: Vec<LightId>,
+    pub(crate) lighting: Lighting,
     pub(crate) cameras: Vec<Camera>,
     pub(crate) film: FilmDesc,
     pub(crate) filter: FilterDesc,
@@ -158,7 +148,7 @@ impl Scene {
         let mut cameras = self.cameras.clone();
         let count = cameras.len();
         *cameras.get_mut(position).ok_or(BuildError::NoSuchCamera { position, count })? = camera;
-        check_cameras(&cameras)?;
+        camera::check(&cameras)?;
         self.cameras = cameras;
         Ok(())
     }
@@ -168,7 +158,7 @@ impl Scene {
     /// # Errors
     /// [`BuildError`] for a camera that [`Scene::build`] would refuse.
     pub fn check_camera(&self, camera: &Camera) -> Result<(), BuildError> {
-        check_cameras(std::slice::from_ref(camera))?;
+        camera::check(std::slice::from_ref(camera))?;
         let count = self.media.media.len();
         match camera.medium {
             Some(MediumId(medium)) if medium as usize >= count => {
@@ -220,7 +210,7 @@ impl Scene {
 
     /// Every light.
     pub fn lights(&self) -> &[Light] {
-        &self.lights
+        self.lighting.lights()
     }
 
     /// Dropped parts, and causes of slow rendering.
@@ -506,23 +496,29 @@ impl Scene {
         u: DVec2,
     ) -> Option<(LightId, LightSample)> {
         let place = Place { from, normal };
-        self.light_choice.sample(&self.lights, &self.entries, &place, time, [choose, u.x, u.y], sampling)
+        self.lighting.sample(&place, time, [choose, u.x, u.y], sampling)
     }
 
     /// The lights over lanes: as [`Scene::sample_light`], [`Scene::light_pdf`] and [`Scene::escaped`].
     pub fn lane_lights(&self) -> &LaneLights {
-        &self.lane_lights
+        &self.lighting.lanes
+    }
+
+    /// [`Interaction::terminator_origin`], unless something lies between it and the face.
+    pub fn unoccluded_terminator_origin(&self, at: &Interaction) -> Option<DVec3> {
+        let offset = at.terminator_offset?;
+        let way = at.leave_from(at.incident_origin, offset).with_range(0.0, 1.0);
+        (!self.is_occluded(&way)).then(|| at.incident_origin + offset)
     }
 
     /// A light chosen by power, with its probability; `None` without lights.
     pub fn choose_light(&self, choose: f64) -> Option<(LightId, f64)> {
-        let choice = self.light_by_power.as_ref()?.sample(choose);
-        Some((LightId(choice.index as u32), choice.probability))
+        self.lighting.choose_by_power(choose)
     }
 
     /// A sample of one light for `from` at a time, in a direction chosen by `u`.
     pub fn sample_one_light(&self, light: LightId, from: DVec3, time: f64, u: DVec2) -> Option<LightSample> {
-        self.lights[light.0 as usize].sample(&self.entries, from, time, u)
+        self.lights()[light.0 as usize].sample(&self.entries, from, time, u)
     }
 
     /// The density per unit solid angle with which [`Scene::sample_light`] samples `hit` from `from` with a normal; 0
@@ -531,22 +527,23 @@ impl Scene {
         let (Some(light), Some(geometric)) = (hit.light, &hit.geometric) else { return 0.0 };
         let surface = Some((&**geometric, hit.primitive));
         let ray = Ray::new(from, -hit.towards_origin).at_time(hit.time);
-        self.light_choice.pdf(&self.lights, light, &ray, normal, surface) as f32
+        self.lighting.pdf(light, &ray, normal, surface) as f32
     }
 
     /// The radiance of each infinite light along a ray that leaves the scene, with the density with which
     /// [`Scene::sample_light`] samples that direction from the ray's origin with a normal.
     pub fn escaped<'s>(&'s self, ray: &'s Ray, normal: DVec3) -> impl Iterator<Item = (Spectrum, f32)> + 's {
-        self.infinite.iter().map(move |&id| {
-            let light = &self.lights[id.0 as usize];
-            let pdf = self.light_choice.pdf(&self.lights, id, ray, normal, None);
+        self.lighting.infinite.iter().map(move |&id| {
+            let light = &self.lights()[id.0 as usize];
+            let pdf = self.lighting.pdf(id, ray, normal, None);
             (light.escaped(ray.origin, ray.direction), pdf as f32)
         })
     }
 
     /// The radiance of each infinite light along a ray that leaves the scene.
     pub fn background<'s>(&'s self, ray: &'s Ray) -> impl Iterator<Item = Spectrum> + 's {
-        self.infinite.iter().map(move |&id| self.lights[id.0 as usize].escaped(ray.origin, ray.direction))
+        let lights = self.lights();
+        self.lighting.infinite.iter().map(move |&id| lights[id.0 as usize].escaped(ray.origin, ray.direction))
     }
 
     fn leaf(&self, hit: &Hit) -> Leaf<'_> {

@@ -8,9 +8,10 @@ use lumbre_kernel::Placement;
 use lumbre_math::DVec3;
 use lumbre_shading::Material;
 
-use crate::build::{inside_out, moved};
 use crate::extent::Extent;
 use crate::light::swept;
+use crate::object_order::inside_out;
+use crate::placed_bounds::moved;
 use crate::{GeometryDesc, Scene, SceneDesc, ShapeDesc};
 
 /// Maximum number of spheres of [`Scene::specular_spheres`].

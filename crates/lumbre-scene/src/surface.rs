@@ -7,10 +7,8 @@ use lumbre_kernel::{DeformingMesh, PreciseMesh, TriangleMesh};
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
-use crate::csg::CsgForm;
-use crate::light::LightId;
 use crate::seams::Pieces;
-use crate::{Boundary, ColouredShape, Emission, Footprint, MeshDesc};
+use crate::{Boundary, ColouredShape, Emission, Footprint, LightId, MeshDesc};
 
 /// The surface data for one id of the tree.
 #[derive(Clone, Debug)]
@@ -29,6 +27,25 @@ pub(crate) struct SurfaceEntry {
     /// Whether the material has textures, and needs footprints.
     pub is_textured: bool,
     pub form: Form,
+}
+
+/// A CSG with the surface entry of each leaf.
+#[derive(Clone, Debug)]
+pub(crate) struct CsgForm {
+    pub csg: lumbre_geometry::Csg,
+    /// In the order of the leaves.
+    pub leaves: Vec<SurfaceEntry>,
+}
+
+impl CsgForm {
+    /// The leaf that a root lies on.
+    pub(crate) fn leaf(
+        &self,
+        root: &lumbre_geometry::Root,
+    ) -> Option<(&SurfaceEntry, lumbre_geometry::LeafPart)> {
+        let part = self.csg.leaf_of(root)?;
+        Some((self.leaves.get(part.leaf)?, part))
+    }
 }
 
 impl SurfaceEntry {

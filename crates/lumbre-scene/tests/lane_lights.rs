@@ -105,7 +105,7 @@ impl Job for Samples<'_> {
             ];
             let active = R::Mask::first(questions.len() - at);
             let lights = self.scene.lane_lights();
-            let sample = lights.sample(self.scene, active, &receiver, u, self.sampling);
+            let sample = lights.sample(active, &receiver, u, self.sampling);
             let bits = [sample.infinite, sample.delta, sample.valid].map(Mask::to_bitmask);
             for lane in 0..R::LANES.min(questions.len() - at) {
                 let single = |v: V3<R>| [v.x, v.y, v.z].map(|x| x.to_lanes()[lane]);
@@ -157,7 +157,6 @@ impl Job for Densities<'_> {
             let receiver =
                 Receiver::<R> { from: points::<R>(&from, at), normal: vectors(&normal, at), time: None };
             let density = scene.lane_lights().pdf(
-                scene,
                 R::Mask::first(found.len() - at),
                 &receiver,
                 R::UInt::from_slice(&entry[at..]),
@@ -190,8 +189,7 @@ impl Job for Escapes<'_> {
             let receiver =
                 Receiver::<R> { from: points::<R>(&from, at), normal: vectors(&normal, at), time: None };
             let active = R::Mask::first(rays.len() - at);
-            let (radiance, pdf) =
-                scene.lane_lights().escaped(scene, 0, active, &receiver, vectors(&direction, at));
+            let (radiance, pdf) = scene.lane_lights().escaped(0, active, &receiver, vectors(&direction, at));
             for lane in 0..R::LANES.min(rays.len() - at) {
                 let radiance = [radiance.x, radiance.y, radiance.z].map(|c| c.to_lanes()[lane]);
                 answers.push((radiance, pdf.to_lanes()[lane]));

@@ -22,7 +22,7 @@ use crate::transport::through::straight_on;
 ///
 /// If the faces of a mesh approximate a smooth surface that bulges out over them, directions below a face but above
 /// that surface are valid: they stay as they are, and their rays start on it
-/// ([`Interaction::unoccluded_terminator_origin`]). So shadows end where the smooth surface turns away from the light,
+/// ([`Scene::unoccluded_terminator_origin`]). So shadows end where the smooth surface turns away from the light,
 /// not at the edge of a face. J. Hanika ("Hacking the Shadow Terminator", 2021) starts all rays there. Here only rays
 /// below the face do, so that objects on the surface do not seem to hover.
 ///
@@ -39,7 +39,7 @@ pub(crate) struct Vertex<'a, 's> {
     /// That normal, if it only decides the side of a direction, as in pbrt.
     side: Option<Vec3>,
     scene: &'s Scene,
-    /// [`Interaction::unoccluded_terminator_origin`], computed on demand.
+    /// [`Scene::unoccluded_terminator_origin`], computed on demand.
     terminator_origin: OnceCell<Option<DVec3>>,
 }
 
@@ -133,7 +133,7 @@ impl<'a, 's> Vertex<'a, 's> {
     }
 
     fn terminator_origin(&self) -> Option<DVec3> {
-        *self.terminator_origin.get_or_init(|| self.met.unoccluded_terminator_origin(self.scene))
+        *self.terminator_origin.get_or_init(|| self.scene.unoccluded_terminator_origin(self.met))
     }
 
     /// The BSDF directions that map to this one: itself, and the one that is folded onto it.

@@ -163,7 +163,7 @@ impl Job for Light<'_, '_> {
                 normal,
                 time: if scene.moves() { Some(R::Double::gather(&slots.time, slot)) } else { None },
             };
-            let sample = scene.lane_lights().sample_one(scene, light, lanes, &receiver, [u[0], u[1], u[3]]);
+            let sample = scene.lane_lights().sample_one(light, lanes, &receiver, [u[0], u[1], u[3]]);
             let cosine = normal.dot(sample.towards);
             let density = R::select(sample.delta, R::one(), sample.pdf);
             let is_lit = lanes & sample.valid & R::zero().simd_lt(cosine) & R::zero().simd_lt(density);
@@ -210,7 +210,7 @@ impl Job for Background<'_> {
             let mut sum = V3::splat(R::zero());
             let mut light = 0;
             while light < lights.infinite_count() {
-                sum = sum + lights.background(scene, light, lanes, &receiver, direction);
+                sum = sum + lights.background(light, lanes, &receiver, direction);
                 light += 1;
             }
             sum.x.copy_to_slice(&mut behind[0][done..]);

@@ -41,7 +41,7 @@ impl Job for Escape<'_, '_> {
                     .then_some(R::Double::gather(&slots.time, R::UInt::gather(&paths.slot, at))),
             };
             let direction = gather3(&paths.direction, at);
-            let (radiance, pdf) = lights.escaped(setting.scene, light, lanes, &receiver, direction);
+            let (radiance, pdf) = lights.escaped(light, lanes, &receiver, direction);
             let [r, g, b] = [radiance.x.to_lanes(), radiance.y.to_lanes(), radiance.z.to_lanes()];
             let (at, pdf) = (at.to_lanes(), pdf.to_lanes());
             let mut bits = lanes.to_bitmask();

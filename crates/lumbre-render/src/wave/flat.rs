@@ -265,7 +265,7 @@ fn light_pdf<R: Real>(
     let id = R::UInt::from_slice(&hits.id[done..]);
     let triangle = R::UInt::from_slice(&hits.triangle[done..]);
     let lights = setting.scene.lane_lights();
-    lights.pdf(setting.scene, chosen, &receiver, id, triangle, point).or_zero(chosen)
+    lights.pdf(chosen, &receiver, id, triangle, point).or_zero(chosen)
 }
 
 /// Records the light that paths found.

@@ -87,7 +87,7 @@ fn colour(
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;
-        let id = scene.lane_lights().light_of(scene, source[lane]);
+        let id = scene.lane_lights().light_of(source[lane]);
         let colour = Spectrum::new(radiance[0][lane], radiance[1][lane], radiance[2][lane]);
         let wavelengths = &shade.slots.wavelengths[slot[lane] as usize];
         let values = scene.light_at_wavelengths(id, colour, wavelengths).to_array();

@@ -318,7 +318,7 @@ impl<'s> Shade<'_, 's> {
             Strategy::Both | Strategy::Bsdf => Sampling::Mis,
         };
         let mut light: LaneLightSample<R> =
-            scene.lane_lights().sample(scene, useful, &receiver, [u[2], u[0], u[1], u[3]], sampling);
+            scene.lane_lights().sample(useful, &receiver, [u[2], u[0], u[1], u[3]], sampling);
         if self.setting.is_spectral {
             light.radiance = at_wavelengths(self, useful & light.valid, arrived.slot, &light);
         }

@@ -360,7 +360,7 @@ impl<'s> Wave<'s> {
         let point = here.surface.point;
         let (id, triangle) = (UInt::splat(met.id), UInt::splat(met.triangle));
         let point = V3::new(point.x, point.y, point.z);
-        scene.lane_lights().pdf(scene, true, &receiver, id, triangle, point)
+        scene.lane_lights().pdf(true, &receiver, id, triangle, point)
     }
 
     /// Traces a path through the medium before a surface; false if it scatters or ends in it.

@@ -4,7 +4,8 @@ use lumbre_geometry::{Ray, Surface};
 use lumbre_math::{DVec2, DVec3};
 
 use super::tree::{Emitter, HORIZON_SLACK, LightTree, Place};
-use super::{Light, LightId, LightSample};
+use super::{Light, LightSample};
+use crate::LightId;
 use crate::surface::SurfaceEntry;
 
 /// The purpose of light samples.

@@ -3,9 +3,9 @@
 use lumbre_shading::Spectrum;
 use lumbre_shading::spectrum::Wavelengths;
 
-use super::{Light, LightId};
-use crate::Scene;
+use super::Light;
 use crate::light_colour::LightColour;
+use crate::{LightId, Scene};
 
 impl Scene {
     /// The light of one of the scene's lights at some wavelengths; `radiance` is its colour, in linear Rec. 709.
@@ -15,9 +15,9 @@ impl Scene {
         radiance: Spectrum,
         wavelengths: &Wavelengths,
     ) -> Spectrum {
-        match &self.light_colours[light.0 as usize] {
+        match &self.lighting.colours[light.0 as usize] {
             LightColour::Surface => {
-                let emission = self.lights[light.0 as usize]
+                let emission = self.lights()[light.0 as usize]
                     .entry()
                     .and_then(|entry| self.entries[entry as usize].emission.as_ref());
                 match emission {

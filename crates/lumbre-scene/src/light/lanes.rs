@@ -4,69 +4,35 @@ mod elsewhere;
 mod environment;
 mod piece;
 mod point;
+mod sample;
 mod scalar;
 mod table;
 mod tree;
 
+use std::sync::Arc;
+
 use lumbre_geometry::Ray;
 use lumbre_math::DVec3;
-use lumbre_simd::{Double, MAX_LANES, Mask, Real, Task, UInt, V3};
+use lumbre_simd::{MAX_LANES, Mask, Real, Task, UInt, V3};
 
 use self::elsewhere::LaneElsewhere;
 pub(crate) use self::environment::LaneMaps;
+use self::sample::below_one;
+pub use self::sample::{LaneLightSample, Receiver};
 use self::scalar::{Receivers, Samples, doubles, lanes_of, point_of, vector};
 use self::table::{NONE, Table, kind};
 use self::tree::LanePlace;
-use super::choice::LightChoice;
-use super::{Light, LightId, Sampling};
-use crate::Scene;
-use crate::surface::SurfaceEntry;
-
-/// Light that arrives at a point in each lane, from a sampled direction. Undefined unless `valid`.
-#[derive(Clone, Copy, Debug)]
-pub struct LaneLightSample<R: Real> {
-    /// Unit, towards the light.
-    pub towards: V3<R>,
-    /// The end of the shadow segment, unless the light is at infinity.
-    pub point: V3<R::Double>,
-    /// An error bound of each component of the point.
-    pub error: V3<R::Double>,
-    /// The unit normal there, on the emissive side; zero without a surface.
-    pub normal: V3<R>,
-    /// Whether it is at infinity.
-    pub infinite: R::Mask,
-    /// The radiance that arrives if unoccluded. For a delta light, the irradiance on a surface that faces it, divided
-    /// by the probability of the choice.
-    pub radiance: V3<R>,
-    /// How the direction was chosen, per unit solid angle, with the probability of the choice.
-    pub pdf: R,
-    /// Whether the light is a delta light, which has no density.
-    pub delta: R::Mask,
-    /// Whether any light arrives.
-    pub valid: R::Mask,
-    /// The sampled light: see [`LaneLights::light_of`].
-    pub source: R::UInt,
-}
-
-/// The lit point in each lane.
-#[derive(Clone, Copy, Debug)]
-pub struct Receiver<R: Real> {
-    /// The point.
-    pub from: V3<R::Double>,
-    /// The unit geometric normal on the viewer's side; zero if light from every side counts: for a transmissive
-    /// surface, and in a medium.
-    pub normal: V3<R>,
-    /// The time; `None` if nothing moves.
-    pub time: Option<R::Double>,
-}
+use super::{Light, LightSources, Sampling};
+use crate::LightId;
 
 /// The lights of a scene, laid out for lanes.
 ///
 /// Uniformly emissive triangles and rectangles, point, spot and directional lights, uniform light and environment maps
 /// are sampled in lanes, and so is the choice among all lights. Other lights are sampled by the code of
-/// [`Scene::sample_light`], lane by lane.
+/// [`crate::Scene::sample_light`], lane by lane.
 #[derive(Clone, Debug, Default)]
 pub struct LaneLights {
+    sources: Arc<LightSources>,
     table: Table,
     elsewhere: Vec<LaneElsewhere>,
     /// The probability of lights that are everywhere, if others may contribute.
@@ -75,68 +41,25 @@ pub struct LaneLights {
     infinite: Vec<u32>,
 }
 
-/// The largest number below 1.
-#[inline(always)]
-fn below_one<R: Real>() -> R {
-    R::splat(1.0 - 0.5 * f32::EPSILON)
-}
-
 /// The bit of a source that marks an index among the lights that are everywhere; without it, the source is an emitter.
 const ELSEWHERE: u32 = 1 << 31;
 
 /// The spacing of uniform numbers.
 const STEP: f32 = 1.0 / 16_777_216.0;
 
-impl<R: Real> LaneLightSample<R> {
-    #[inline(always)]
-    fn none() -> Self {
-        let (zero, nowhere) = (V3::splat(R::zero()), V3::splat(R::Double::splat(0.0)));
-        let none = R::Mask::splat(false);
-        Self {
-            towards: zero,
-            point: nowhere,
-            error: nowhere,
-            normal: zero,
-            infinite: none,
-            radiance: zero,
-            pdf: R::zero(),
-            delta: none,
-            valid: none,
-            source: R::UInt::splat(0),
-        }
-    }
-
-    /// A light's `other` in some lanes, with directions more likely by this factor.
-    #[inline(always)]
-    fn with(self, mask: R::Mask, other: Self, probability: R, source: R::UInt) -> Self {
-        let radiance = V3::select(other.delta, other.radiance * probability.recip(), other.radiance);
-        Self {
-            towards: V3::select(mask, other.towards, self.towards),
-            point: V3::select_f64(mask, other.point, self.point),
-            error: V3::select_f64(mask, other.error, self.error),
-            normal: V3::select(mask, other.normal, self.normal),
-            infinite: (mask & other.infinite) | (!mask & self.infinite),
-            radiance: V3::select(mask, radiance, self.radiance),
-            pdf: R::select(mask, other.pdf * probability, self.pdf),
-            delta: (mask & other.delta) | (!mask & self.delta),
-            valid: (mask & other.valid) | (!mask & self.valid),
-            source: R::UInt::select(mask, source, self.source),
-        }
-    }
-}
-
 impl LaneLights {
-    pub(crate) fn new(
-        lights: &[Light],
-        entries: &[SurfaceEntry],
-        choice: &LightChoice,
-        infinite: &[LightId],
-    ) -> Self {
+    pub(crate) fn new(sources: &Arc<LightSources>, infinite: &[LightId]) -> Self {
+        let LightSources { lights, entries, choice } = &**sources;
         let elsewhere = LaneElsewhere::all(lights, choice);
         let position = |id: &LightId| elsewhere.iter().position(|light| light.light == id.0);
         let infinite = infinite.iter().filter_map(position).map(|position| position as u32).collect();
-        let table = Table::new(lights, entries, choice);
-        Self { table, share_elsewhere: choice.share_elsewhere as f32, infinite, elsewhere }
+        Self {
+            table: Table::new(lights, entries, choice),
+            share_elsewhere: choice.share_elsewhere as f32,
+            infinite,
+            elsewhere,
+            sources: Arc::clone(sources),
+        }
     }
 
     /// A sample of light for each lane of `active`. `u` are four uniform numbers: the choice of a light, a point of it,
@@ -144,38 +67,36 @@ impl LaneLights {
     #[inline(always)]
     pub fn sample<R: Real>(
         &self,
-        scene: &Scene,
         active: R::Mask,
         receiver: &Receiver<R>,
         u: [R; 4],
         sampling: Sampling,
     ) -> LaneLightSample<R> {
-        R::call(SampleTask { lights: self, scene, active, receiver, u, sampling })
+        R::call(SampleTask { lights: self, active, receiver, u, sampling })
     }
 
     #[inline(always)]
     fn sample_inlined<R: Real>(
         &self,
-        scene: &Scene,
         active: R::Mask,
         receiver: &Receiver<R>,
         u: [R; 4],
         sampling: Sampling,
     ) -> LaneLightSample<R> {
         let place = LanePlace::new(&self.table, receiver);
-        let sum = self.sum_elsewhere(scene, active, &place, receiver);
+        let sum = self.sum_elsewhere(active, &place, receiver);
         let share = self.share_elsewhere_at(active, &place, sum);
         let is_elsewhere = active & u[0].simd_lt(share);
         let mut sample = LaneLightSample::none();
         if is_elsewhere.any() {
-            let chosen = self.choose_elsewhere(scene, is_elsewhere, &place, receiver, u[0] / share * sum);
+            let chosen = self.choose_elsewhere(is_elsewhere, &place, receiver, u[0] / share * sum);
             let probability = share * (chosen.1 / sum);
             let mut position = 0;
             while position < self.elsewhere.len() {
                 let here = is_elsewhere & chosen.0.simd_eq(R::UInt::splat(position as u32));
                 if here.any() {
                     let light = &self.elsewhere[position];
-                    let of_light = light.sample(scene, here, receiver, [u[1], u[2], u[3]], sampling);
+                    let of_light = light.sample(&self.sources, here, receiver, [u[1], u[2], u[3]], sampling);
                     let source = R::UInt::splat(ELSEWHERE | position as u32);
                     sample = sample.with(here, of_light, probability, source);
                 }
@@ -207,7 +128,7 @@ impl LaneLights {
                 let mut samples = Samples::none();
                 let receivers = Receivers::new(receiver);
                 let emitters = chosen.emitter.to_lanes();
-                sample_emitters(scene, others.to_bitmask(), &emitters, &receivers, &u, &mut samples);
+                sample_emitters(&self.sources, others.to_bitmask(), &emitters, &receivers, &u, &mut samples);
                 sample = sample.with(others, samples.to_lanes(), probability, chosen.emitter);
             }
         }
@@ -215,9 +136,9 @@ impl LaneLights {
     }
 
     /// The light of a sample by its [`LaneLightSample::source`].
-    pub fn light_of(&self, scene: &Scene, source: u32) -> LightId {
+    pub fn light_of(&self, source: u32) -> LightId {
         LightId(match source & ELSEWHERE {
-            0 => scene.light_choice.emitters[source as usize].0,
+            0 => self.sources.choice.emitters[source as usize].0,
             _ => self.elsewhere[(source & !ELSEWHERE) as usize].light,
         })
     }
@@ -233,17 +154,16 @@ impl LaneLights {
     }
 
     /// A sample of one light that is everywhere, for code that finds light in no other way: as
-    /// [`Scene::sample_one_light`]. `u` is a point of it, and further digits of the first coordinate.
+    /// [`crate::Scene::sample_one_light`]. `u` is a point of it, and further digits of the first coordinate.
     #[inline(always)]
     pub fn sample_one<R: Real>(
         &self,
-        scene: &Scene,
         position: usize,
         active: R::Mask,
         receiver: &Receiver<R>,
         u: [R; 3],
     ) -> LaneLightSample<R> {
-        self.elsewhere[position].sample(scene, active, receiver, u, Sampling::LightsOnly)
+        self.elsewhere[position].sample(&self.sources, active, receiver, u, Sampling::LightsOnly)
     }
 
     /// The density per unit solid angle with which [`LaneLights::sample`] with [`Sampling::Mis`] would have sampled a
@@ -251,7 +171,6 @@ impl LaneLights {
     #[inline(always)]
     pub fn pdf<R: Real>(
         &self,
-        scene: &Scene,
         active: R::Mask,
         receiver: &Receiver<R>,
         entry: R::UInt,
@@ -264,14 +183,13 @@ impl LaneLights {
             return R::zero();
         }
         let emitter = R::UInt::select(listed, emitter, R::UInt::splat(0));
-        R::call(PdfTask { lights: self, scene, listed, receiver, emitter, primitive, point })
+        R::call(PdfTask { lights: self, listed, receiver, emitter, primitive, point })
     }
 
     /// The density of a point of an emitter in each listed lane.
     #[inline(always)]
     fn pdf_inlined<R: Real>(
         &self,
-        scene: &Scene,
         listed: R::Mask,
         receiver: &Receiver<R>,
         emitter: R::UInt,
@@ -279,7 +197,7 @@ impl LaneLights {
         point: V3<R::Double>,
     ) -> R {
         let place = LanePlace::new(&self.table, receiver);
-        let sum = self.sum_elsewhere(scene, listed, &place, receiver);
+        let sum = self.sum_elsewhere(listed, &place, receiver);
         let share = self.share_elsewhere_at(listed, &place, sum);
         let probability = (R::one() - share) * tree::probability(&self.table, listed, &place, emitter);
         let kinds = R::UInt::gather(&self.table.kinds, emitter);
@@ -292,7 +210,13 @@ impl LaneLights {
         if others.any() {
             let mut of_others = [0.0; MAX_LANES];
             let met = (emitter.to_lanes(), primitive.to_lanes(), doubles::<R>(point));
-            pdf_of_emitters(scene, others.to_bitmask(), &Receivers::new(receiver), &met, &mut of_others);
+            pdf_of_emitters(
+                &self.sources,
+                others.to_bitmask(),
+                &Receivers::new(receiver),
+                &met,
+                &mut of_others,
+            );
             pdf = R::select(others, R::from_lanes(&of_others), pdf);
         }
         (probability * pdf).or_zero(listed)
@@ -307,13 +231,12 @@ impl LaneLights {
     #[inline(always)]
     pub fn background<R: Real>(
         &self,
-        scene: &Scene,
         position: usize,
         active: R::Mask,
         receiver: &Receiver<R>,
         direction: V3<R>,
     ) -> V3<R> {
-        self.elsewhere[self.infinite[position] as usize].escaped(scene, active, receiver, direction).0
+        self.elsewhere[self.infinite[position] as usize].escaped(&self.sources, active, receiver, direction).0
     }
 
     /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction, and the density with which
@@ -321,46 +244,38 @@ impl LaneLights {
     #[inline(always)]
     pub fn escaped<R: Real>(
         &self,
-        scene: &Scene,
         position: usize,
         active: R::Mask,
         receiver: &Receiver<R>,
         direction: V3<R>,
     ) -> (V3<R>, R) {
-        R::call(EscapeTask { lights: self, scene, position, active, receiver, direction })
+        R::call(EscapeTask { lights: self, position, active, receiver, direction })
     }
 
     #[inline(always)]
     fn escaped_inlined<R: Real>(
         &self,
-        scene: &Scene,
         position: usize,
         active: R::Mask,
         receiver: &Receiver<R>,
         direction: V3<R>,
     ) -> (V3<R>, R) {
         let light = &self.elsewhere[self.infinite[position] as usize];
-        let (radiance, pdf) = light.escaped(scene, active, receiver, direction);
+        let (radiance, pdf) = light.escaped(&self.sources, active, receiver, direction);
         let place = LanePlace::new(&self.table, receiver);
-        let sum = self.sum_elsewhere(scene, active, &place, receiver);
+        let sum = self.sum_elsewhere(active, &place, receiver);
         let share = self.share_elsewhere_at(active, &place, sum);
-        let given = light.given(scene, active, &place, receiver);
+        let given = light.given(&self.sources, active, &place, receiver);
         let probability = (share * (given / sum)).or_zero(given.simd_gt(R::zero()));
         (radiance, probability * pdf)
     }
 
     /// The contribution of all lights that are everywhere at a point, in arbitrary units.
     #[inline(always)]
-    fn sum_elsewhere<R: Real>(
-        &self,
-        scene: &Scene,
-        active: R::Mask,
-        place: &LanePlace<R>,
-        receiver: &Receiver<R>,
-    ) -> R {
+    fn sum_elsewhere<R: Real>(&self, active: R::Mask, place: &LanePlace<R>, receiver: &Receiver<R>) -> R {
         let mut sum = R::zero();
         for light in &self.elsewhere {
-            sum = sum + light.given(scene, active, place, receiver);
+            sum = sum + light.given(&self.sources, active, place, receiver);
         }
         sum
     }
@@ -380,7 +295,6 @@ impl LaneLights {
     #[inline(always)]
     fn choose_elsewhere<R: Real>(
         &self,
-        scene: &Scene,
         active: R::Mask,
         place: &LanePlace<R>,
         receiver: &Receiver<R>,
@@ -388,7 +302,7 @@ impl LaneLights {
     ) -> (R::UInt, R) {
         let (mut before, mut chosen, mut of_chosen) = (R::zero(), R::UInt::splat(0), R::zero());
         for (position, light) in self.elsewhere.iter().enumerate() {
-            let given = light.given(scene, active, place, receiver);
+            let given = light.given(&self.sources, active, place, receiver);
             // The last one that starts before it.
             let is_later = given.simd_gt(R::zero()) & before.simd_le(up_to);
             chosen = R::UInt::select(is_later, R::UInt::splat(position as u32), chosen);
@@ -401,7 +315,6 @@ impl LaneLights {
 
 struct SampleTask<'t, R: Real> {
     lights: &'t LaneLights,
-    scene: &'t Scene,
     active: R::Mask,
     receiver: &'t Receiver<R>,
     u: [R; 4],
@@ -413,14 +326,13 @@ impl<R: Real> Task<R> for SampleTask<'_, R> {
 
     #[inline(always)]
     fn run(self) -> LaneLightSample<R> {
-        let Self { lights, scene, active, receiver, u, sampling } = self;
-        lights.sample_inlined(scene, active, receiver, u, sampling)
+        let Self { lights, active, receiver, u, sampling } = self;
+        lights.sample_inlined(active, receiver, u, sampling)
     }
 }
 
 struct PdfTask<'t, R: Real> {
     lights: &'t LaneLights,
-    scene: &'t Scene,
     listed: R::Mask,
     receiver: &'t Receiver<R>,
     emitter: R::UInt,
@@ -433,14 +345,13 @@ impl<R: Real> Task<R> for PdfTask<'_, R> {
 
     #[inline(always)]
     fn run(self) -> R {
-        let Self { lights, scene, listed, receiver, emitter, primitive, point } = self;
-        lights.pdf_inlined(scene, listed, receiver, emitter, primitive, point)
+        let Self { lights, listed, receiver, emitter, primitive, point } = self;
+        lights.pdf_inlined(listed, receiver, emitter, primitive, point)
     }
 }
 
 struct EscapeTask<'t, R: Real> {
     lights: &'t LaneLights,
-    scene: &'t Scene,
     position: usize,
     active: R::Mask,
     receiver: &'t Receiver<R>,
@@ -452,14 +363,14 @@ impl<R: Real> Task<R> for EscapeTask<'_, R> {
 
     #[inline(always)]
     fn run(self) -> (V3<R>, R) {
-        let Self { lights, scene, position, active, receiver, direction } = self;
-        lights.escaped_inlined(scene, position, active, receiver, direction)
+        let Self { lights, position, active, receiver, direction } = self;
+        lights.escaped_inlined(position, active, receiver, direction)
     }
 }
 
 #[inline(never)]
 fn sample_emitters(
-    scene: &Scene,
+    sources: &LightSources,
     active: u32,
     emitters: &[u32; MAX_LANES],
     receivers: &Receivers,
@@ -470,8 +381,8 @@ fn sample_emitters(
         let (place, time) = (receivers.place(lane), receivers.time(lane));
         let emitter = emitters[lane] as usize;
         let u = point_of(u, lane);
-        let choice = &scene.light_choice;
-        let sample = choice.sample_emitter(&scene.lights, &scene.entries, emitter, place.from, time, u);
+        let LightSources { lights, entries, choice } = sources;
+        let sample = choice.sample_emitter(lights, entries, emitter, place.from, time, u);
         if let Some(sample) = sample {
             samples.set(lane, &sample);
         }
@@ -480,7 +391,7 @@ fn sample_emitters(
 
 #[inline(never)]
 fn pdf_of_emitters(
-    scene: &Scene,
+    sources: &LightSources,
     active: u32,
     receivers: &Receivers,
     (emitter, primitive, point): &([u32; MAX_LANES], [u32; MAX_LANES], [[f64; MAX_LANES]; 3]),
@@ -488,8 +399,8 @@ fn pdf_of_emitters(
 ) {
     for lane in lanes_of(active) {
         let (place, time) = (receivers.place(lane), receivers.time(lane));
-        let (light, piece) = scene.light_choice.emitters[emitter[lane] as usize];
-        let light = &scene.lights[light as usize];
+        let (light, piece) = sources.choice.emitters[emitter[lane] as usize];
+        let light = &sources.lights[light as usize];
         let point = DVec3::from(vector(point, lane));
         if let (Light::Mesh(light), Some(piece)) = (light, piece) {
             pdf[lane] = light.piece_pdf(place.from, point, piece) as f32;

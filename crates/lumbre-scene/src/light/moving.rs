@@ -8,7 +8,7 @@ use lumbre_shading::Spectrum;
 
 use super::tree::{Emitter, Facing};
 use super::{Light, LightSample};
-use crate::build::moved;
+use crate::placed_bounds::moved;
 use crate::surface::SurfaceEntry;
 
 /// A light in its own space, and the rigid motion of that space.

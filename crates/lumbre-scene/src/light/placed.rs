@@ -7,7 +7,7 @@ use lumbre_math::{DVec2, DVec3, Transform};
 use super::moving::swept;
 use super::tree::{Emitter, Facing};
 use super::{Light, LightPoint, LightSample};
-use crate::build::moved;
+use crate::placed_bounds::moved;
 use crate::surface::SurfaceEntry;
 
 /// A light in the space of an object, and the object's placement.

@@ -5,12 +5,11 @@ use std::f32::consts::FRAC_1_PI;
 use lumbre_math::DVec3;
 use lumbre_simd::{Double, MAX_LANES, Mask, Real, UInt, V3, math};
 
+use super::sample::{LaneLightSample, Receiver};
 use super::scalar::{self, Receivers, Samples, lanes_of};
 use super::tree::{LanePlace, SLACK};
-use super::{LaneLightSample, Receiver};
-use crate::Scene;
 use crate::light::choice::LightChoice;
-use crate::light::{Light, Sampling};
+use crate::light::{Light, LightSources, Sampling};
 
 /// A light that is everywhere.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +74,7 @@ impl LaneElsewhere {
     #[inline(always)]
     pub(super) fn given<R: Real>(
         &self,
-        scene: &Scene,
+        sources: &LightSources,
         active: R::Mask,
         place: &LanePlace<R>,
         receiver: &Receiver<R>,
@@ -86,7 +85,7 @@ impl LaneElsewhere {
             Kind::Distant { towards, .. } | Kind::Disc { towards, .. } => V3::constant(towards),
             Kind::Moving => {
                 let mut towards = [[0.0; MAX_LANES]; 3];
-                directions(scene, self.light, active.to_bitmask(), &Receivers::new(receiver), &mut towards);
+                directions(sources, self.light, active.to_bitmask(), &Receivers::new(receiver), &mut towards);
                 scalar::from_singles(&towards)
             }
         };
@@ -101,7 +100,7 @@ impl LaneElsewhere {
     #[inline(always)]
     pub(super) fn sample<R: Real>(
         &self,
-        scene: &Scene,
+        sources: &LightSources,
         active: R::Mask,
         receiver: &Receiver<R>,
         u: [R; 3],
@@ -121,7 +120,7 @@ impl LaneElsewhere {
             valid: active,
             source: R::UInt::splat(0),
         };
-        match (self.kind, &scene.lights[self.light as usize]) {
+        match (self.kind, &sources.lights[self.light as usize]) {
             (Kind::Uniform { radiance }, _) => {
                 let two = R::splat(2.0);
                 let (sin, cos) = math::sin_cos_turns(u[1]);
@@ -145,7 +144,15 @@ impl LaneElsewhere {
                 let u = [u[0].to_lanes(), u[1].to_lanes()];
                 let mut samples = Samples::none();
                 let receivers = Receivers::new(receiver);
-                sample_scalar(scene, self.light, active.to_bitmask(), &receivers, &u, sampling, &mut samples);
+                sample_scalar(
+                    sources,
+                    self.light,
+                    active.to_bitmask(),
+                    &receivers,
+                    &u,
+                    sampling,
+                    &mut samples,
+                );
                 samples.to_lanes()
             }
         }
@@ -155,19 +162,19 @@ impl LaneElsewhere {
     #[inline(always)]
     pub(super) fn escaped<R: Real>(
         &self,
-        scene: &Scene,
+        sources: &LightSources,
         active: R::Mask,
         receiver: &Receiver<R>,
         direction: V3<R>,
     ) -> (V3<R>, R) {
-        match (self.kind, &scene.lights[self.light as usize]) {
+        match (self.kind, &sources.lights[self.light as usize]) {
             (Kind::Uniform { radiance }, _) => (V3::constant(radiance), R::splat(0.25 * FRAC_1_PI)),
             (Kind::Environment, Light::Environment(light)) => light.lane_escaped(direction),
             _ => {
                 let (mut radiance, mut pdf) = ([[0.0; MAX_LANES]; 3], [0.0; MAX_LANES]);
                 let directions = scalar::singles(direction);
                 let (lanes, receivers) = (active.to_bitmask(), Receivers::new(receiver));
-                escaped_scalar(scene, self.light, lanes, &receivers, &directions, &mut radiance, &mut pdf);
+                escaped_scalar(sources, self.light, lanes, &receivers, &directions, &mut radiance, &mut pdf);
                 (scalar::from_singles(&radiance), R::from_lanes(&pdf))
             }
         }
@@ -176,13 +183,13 @@ impl LaneElsewhere {
 
 #[inline(never)]
 fn directions(
-    scene: &Scene,
+    sources: &LightSources,
     light: u32,
     active: u32,
     receivers: &Receivers,
     towards: &mut [[f32; MAX_LANES]; 3],
 ) {
-    let light = &scene.lights[light as usize];
+    let light = &sources.lights[light as usize];
     for lane in lanes_of(active) {
         let Some(direction) = light.towards(receivers.time(lane)) else { continue };
         for (column, number) in towards.iter_mut().zip(direction.as_vec3().to_array()) {
@@ -193,7 +200,7 @@ fn directions(
 
 #[inline(never)]
 fn sample_scalar(
-    scene: &Scene,
+    sources: &LightSources,
     light: u32,
     active: u32,
     receivers: &Receivers,
@@ -204,9 +211,9 @@ fn sample_scalar(
     for lane in lanes_of(active) {
         let u = lumbre_math::DVec2::new(f64::from(u[0][lane]), f64::from(u[1][lane]));
         let (place, time) = (receivers.place(lane), receivers.time(lane));
-        let sample = match &scene.lights[light as usize] {
+        let sample = match &sources.lights[light as usize] {
             Light::Environment(light) if sampling == Sampling::Mis => light.sample_beside_others(u),
-            light => light.sample(&scene.entries, place.from, time, u),
+            light => light.sample(&sources.entries, place.from, time, u),
         };
         if let Some(sample) = sample {
             samples.set(lane, &sample);
@@ -216,7 +223,7 @@ fn sample_scalar(
 
 #[inline(never)]
 fn escaped_scalar(
-    scene: &Scene,
+    sources: &LightSources,
     light: u32,
     active: u32,
     receivers: &Receivers,
@@ -224,7 +231,7 @@ fn escaped_scalar(
     radiance: &mut [[f32; MAX_LANES]; 3],
     pdf: &mut [f32; MAX_LANES],
 ) {
-    let light = &scene.lights[light as usize];
+    let light = &sources.lights[light as usize];
     for lane in lanes_of(active) {
         let direction = DVec3::from(scalar::vector(directions, lane).map(f64::from)).normalize();
         let from = receivers.place(lane).from;

@@ -6,7 +6,7 @@ use lumbre_math::DVec3;
 use lumbre_math::distribution::{PiecewiseConstant1D, PiecewiseConstant2D};
 use lumbre_simd::{Double, Mask, Real, UInt, V3, math};
 
-use super::{LaneLightSample, below_one};
+use super::sample::{LaneLightSample, below_one};
 use crate::EnvironmentMapping;
 use crate::light::Sampling;
 use crate::light::environment::{Environment, Panorama};

@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use lumbre_simd::{Double, Mask, Real, UInt, V3, math};
 
-use super::LaneLightSample;
+use super::sample::LaneLightSample;
 use super::table::{Rows, Table, piece};
 
 /// From this many radii away, sampling by area is as good as by solid angle, and faster.

@@ -2,7 +2,7 @@
 
 use lumbre_simd::{Double, Mask, Real, UInt, V3};
 
-use super::LaneLightSample;
+use super::sample::LaneLightSample;
 use super::table::{Table, point};
 
 /// The light of the point or spot light of each active lane.

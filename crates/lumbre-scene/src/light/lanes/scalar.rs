@@ -4,7 +4,7 @@ use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::Scatter;
 use lumbre_simd::{Double, MAX_LANES, Mask, Real, UInt, V3};
 
-use super::{LaneLightSample, Receiver};
+use super::sample::{LaneLightSample, Receiver};
 use crate::light::{LightSample, Place};
 
 /// A receiver, lane by lane.

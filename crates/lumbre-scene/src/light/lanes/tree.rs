@@ -2,8 +2,8 @@
 
 use lumbre_simd::{Mask, Real, UInt, V3};
 
+use super::sample::{Receiver, below_one};
 use super::table::{LEAF, ROUNDING, Rows, Table, node};
-use super::{Receiver, below_one};
 
 /// A receiver as the tree sees it.
 #[derive(Clone, Copy)]
