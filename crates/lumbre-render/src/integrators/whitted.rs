@@ -73,7 +73,7 @@ impl Whitted {
                 }
                 let mut interiors = came.interiors.clone();
                 if part.crosses {
-                    interiors.cross(vertex.material, here.front);
+                    interiors.cross(vertex.solid(), here.front);
                 }
                 let ray = rounded(vertex.leave(&part));
                 record.note(|| Event::Scattered(Scattered::of(&ray, &part, throughput)));
