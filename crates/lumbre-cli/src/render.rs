@@ -16,14 +16,13 @@ use lumbre::image::{Image, ToneMap};
 use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
-    CancelToken, CheckpointSink, DVec3, Feature, Job, Picture, PixelBounds, RenderOptions, SaveOptions,
-    Scene, SceneDesc, Stage, Staged, Stop, in_words,
+    CancelToken, CheckpointSink, DVec3, Feature, Job, Picture, PixelBounds, Prepared, RenderOptions,
+    SaveOptions, Scene, SceneDesc, Stage, Staged, Stop, in_words,
 };
 use serde_json::json;
 
 use crate::animation::{Animation, ENDINGS, is_animation};
 use crate::checkpoint::{Checkpoint, PartArguments, is_bare_part};
-use crate::defaults::Defaults;
 use crate::denoiser::{Choice, Denoiser};
 use crate::failure::{Failure, print_bytes};
 use crate::names::one_of;
@@ -616,15 +615,12 @@ fn picture(
             "--denoise cannot be used with --integrator normals, depth, albedo or uv: they have no noise";
         return Err(Failure::Usage(why.to_owned()));
     }
-    let is_of_light = kind.needs_light();
-    let mut stage = stage.clone();
-    stage.ground = Defaults::ground(stage.ground, is_of_light);
-    let staged = stage.set(&mut desc);
-    let defaults = Defaults::new(staged, is_of_light);
+    let prepared = lumbre::prepare(&mut desc, stage, arguments.integrator);
+    let is_of_light = prepared.is_of_light();
     if let Some((_, first_stage)) = frame {
-        first_stage.hold(&staged, &mut desc);
+        first_stage.hold(prepared.staged(), &mut desc);
     }
-    let behind = arguments.staging.behind(&defaults, arguments.reading.limits_beside(diagnostics))?;
+    let behind = arguments.staging.behind(&prepared, arguments.reading.limits_beside(diagnostics))?;
     let name = &arguments.scene[0];
     let mut of_frames = Diagnostics::with_strictness(arguments.reading.strictness());
     arguments.reading.check_build(&desc, diagnostics)?;
@@ -651,24 +647,17 @@ fn picture(
         inputs.refuse(path)?;
         probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
     }
-    let mut options = options(arguments, &scene)?;
+    // Parts store samples, not denoised pictures.
+    let keeps_sums = arguments.parts.keeps_sums();
+    let denoises = arguments.denoise.is_none() && !keeps_sums && prepared.denoises();
+    let denoiser = denoiser.or(denoises.then_some(&Denoiser::Own));
+    let mut options = options(arguments, &scene, &prepared, denoiser.is_some() && !keeps_sums)?;
     options.film = film;
     options.transparent = behind.is_transparent();
-    options.spectral &= kind.carries_wavelengths();
     if arguments.spectral && !kind.carries_wavelengths() {
         return Err(Failure::Usage("--spectral works only with --integrator path or caustics".to_owned()));
     }
     options.spectral |= arguments.spectral;
-    let samples_are_asked = arguments.spp.is_some()
-        || arguments.time.is_some()
-        || arguments.noise.is_some()
-        || arguments.parts.keeps_sums();
-    // Parts store samples, not denoised pictures.
-    let denoises = arguments.denoise.is_none() && !arguments.parts.keeps_sums() && defaults.denoises();
-    let denoiser = denoiser.or(denoises.then_some(&Denoiser::Own));
-    if let (Some(spp), Some(_), false) = (defaults.spp(&scene), denoiser, samples_are_asked) {
-        options.stop.spp = spp;
-    }
     // Open Image Denoise needs albedo and normals.
     options.features |= matches!(denoiser, Some(Denoiser::Oidn(_)));
     options.guides = denoiser.is_some();
@@ -683,10 +672,10 @@ fn picture(
             Ok(())
         }
     };
-    if staged.framed && scene.resolved().accel().primitive_count() == 0 {
+    if prepared.staged().framed && scene.resolved().accel().primitive_count() == 0 {
         warn(format!("{}: the scene has no shapes: the picture shows only the background", name.display()))?;
     }
-    if staged.guessed_up && is_first && !arguments.quiet {
+    if prepared.staged().guessed_up && is_first && !arguments.quiet {
         say!("{}: z is up, since the model stands on a plane of z (--up y makes y up)", name.display());
     }
     if !options.spectral && is_first && is_of_light && scene.resolved().disperses() {
@@ -710,7 +699,7 @@ fn picture(
     let exposure = match first.exposure {
         Some(exposure) => exposure,
         None if is_for_displays(&output) => {
-            let stops = defaults.exposure(&scene, &options)?;
+            let stops = prepared.exposure(&scene, &options)?;
             if stops != 0.0 && !arguments.quiet {
                 say!(
                     "exposed by {stops:.1} stops, for the brightness of the file's lights (--exposure 0 turns this off)"
@@ -721,7 +710,7 @@ fn picture(
         None => *first.exposure.insert(0.0),
     };
 
-    let tone_map = arguments.tonemap.unwrap_or(defaults.tone_map());
+    let tone_map = arguments.tonemap.unwrap_or(prepared.tone_map());
     let precision = match scene.resolved().film().single_precision {
         true => ExrPrecision::Float,
         false => ExrPrecision::Half,
@@ -1012,11 +1001,13 @@ fn check_whole(arguments: &Arguments, picture: &Picture, signal: Option<u8>) -> 
     }
 }
 
-fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failure> {
-    let mut options = scene.options();
-    if let Some((width, height)) = arguments.size {
-        options.resize(scene.resolved().film(), width, height);
-    }
+fn options(
+    arguments: &Arguments,
+    scene: &Scene,
+    prepared: &Prepared,
+    is_denoised: bool,
+) -> Result<RenderOptions, Failure> {
+    let mut options = prepared.options(scene, arguments.integrator, arguments.size);
     options.crop = match arguments.crop {
         None => options.crop,
         Some(Crop::Pixels([x0, y0, x1, y1])) if x0 >= options.width || y0 >= options.height => {
@@ -1031,12 +1022,14 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     if let Some(wanted) = &arguments.camera {
         options.camera = camera(scene, wanted)?;
     }
-    options.integrator.kind = arguments.integrator.unwrap_or(options.integrator.kind);
     options.integrator.shading_normals =
         arguments.shading_normals.unwrap_or(options.integrator.shading_normals);
     options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
-    let usual = Stop::usual(options.integrator.kind, scene.resolved().sampler().spp);
+    let usual = match is_denoised {
+        true => options.stop.clone(),
+        false => Stop::usual(options.integrator.kind, scene.resolved().sampler().spp),
+    };
     let spp = match arguments.spp {
         Some(spp) => spp,
         None if arguments.noise.is_some() => Stop::MAX_FOR_NOISE,

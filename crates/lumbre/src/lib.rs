@@ -36,6 +36,7 @@ mod info;
 mod parameter;
 mod part;
 mod picture;
+mod prepare;
 mod scene;
 mod setting;
 mod words;
@@ -74,6 +75,7 @@ pub mod journal {
 pub use parameter::{Parameter, ParameterKind, parameters};
 pub use part::{Job, Part, PartError};
 pub use picture::Picture;
+pub use prepare::{Prepared, prepare};
 pub use scene::{Scene, describe, open, open_with};
 pub use setting::Setting;
 pub use words::in_words;
