@@ -331,8 +331,11 @@ impl Files {
             warnings
                 .push(format!("warning: {}: the scene has no light: its picture is black", name.display()));
         }
-        let mut save = prepared.save_options(&scene, &options)?;
-        save.exposure = self.arguments.exposure.unwrap_or(save.exposure);
+        let mut save = prepared.save_options(&scene);
+        save.exposure = match self.arguments.exposure {
+            Some(exposure) => exposure,
+            None => prepared.exposure(&scene, &options)?,
+        };
         save.tone_map = self.arguments.tonemap.unwrap_or(save.tone_map);
         let background = match behind {
             Backdrop::Background(background) => Some(background),

@@ -64,10 +64,10 @@ impl Look {
         behind: Backdrop,
     ) -> Result<Self, lumbre::Error> {
         let PreparedScene { scene, prepared } = shown;
-        let save = prepared.save_options(scene, options)?;
+        let save = prepared.save_options(scene);
         Ok(Self {
             tone_map: save.tone_map,
-            exposure: save.exposure,
+            exposure: prepared.exposure(scene, options)?,
             precision: save.exr_precision,
             background: match behind {
                 Backdrop::Background(background) => Some(background),

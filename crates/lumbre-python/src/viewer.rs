@@ -72,7 +72,8 @@ impl Source for Live {
         options.threads = rayon::current_num_threads();
         options.stop.spp = self.spp.unwrap_or(options.stop.spp);
         self.check(&options)?;
-        let save = prepared.save_options(&scene, &options)?;
+        let mut save = prepared.save_options(&scene);
+        save.exposure = prepared.exposure(&scene, &options)?;
         Ok(Built {
             scene,
             options,

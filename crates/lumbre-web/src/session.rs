@@ -139,7 +139,8 @@ impl Session {
         }
         // Refused here, and not by the first pass.
         options.bounds().map_err(lumbre::Error::from)?;
-        let save = prepared.save_options(&scene, &options)?;
+        let mut save = prepared.save_options(&scene);
+        save.exposure = prepared.exposure(&scene, &options)?;
         let mut warnings = diagnostics.lines();
         if scene.is_dark() && options.integrator.kind.needs_light() {
             let dark = "the scene has no light: its picture is black";

@@ -39,7 +39,7 @@ pub struct Prepared {
 /// if let Some(background) = prepared.background() {
 ///     picture = picture.over(background);
 /// }
-/// picture.save_with("model.png".as_ref(), &prepared.save_options(&scene, &options)?, &[])?;
+/// picture.save_with("model.png".as_ref(), &prepared.save_options(&scene), &[])?;
 /// # Ok::<(), lumbre::Error>(())
 /// ```
 pub fn prepare(desc: &mut SceneDesc, stage: &Stage, integrator: Option<IntegratorKind>) -> Prepared {
@@ -120,18 +120,14 @@ impl Prepared {
         options
     }
 
-    /// How the picture is saved.
-    ///
-    /// # Errors
-    /// Those of [`Prepared::exposure`].
-    pub fn save_options(&self, scene: &Scene, options: &RenderOptions) -> Result<SaveOptions, Error> {
+    /// How the picture is saved; [`Prepared::exposure`] tells the exposure.
+    pub fn save_options(&self, scene: &Scene) -> SaveOptions {
         let mut save = SaveOptions::default();
         save.tone_map = self.tone_map();
-        save.exposure = self.exposure(scene, options)?;
         if scene.resolved().film().single_precision {
             save.exr_precision = ExrPrecision::Float;
         }
-        Ok(save)
+        save
     }
 
     /// The tone mapping of pictures for displays: neutral in the light of a stage.
