@@ -6,6 +6,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{IsTerminal, Read};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -249,74 +250,71 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     signals.enter(READING);
     let mut stage = arguments.staging.stage(arguments.size, arguments.reading.limits())?;
     arguments.view.set(&mut stage)?;
-    let render_start = start;
     // The first picture's name and exposure are used for all.
     let animation = arguments.animation()?;
-    let mut from_first = First { pattern: None, exposure: arguments.exposure, animation };
-    if let Some(Frames(frames)) = &arguments.frames {
-        let (first, last) = (*frames.start(), *frames.end());
-        let mut first_stage = FirstStage::default();
-        for number in frames.clone() {
-            let start = Instant::now();
-            signals.end_at(arguments.deadline(start));
-            signals.enter(READING);
-            let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
-            let series =
-                Series { number, done: number - first, count: last - first + 1, start: render_start };
-            let frame = Frame { number, is_first: number == first, series };
-            if !arguments.quiet {
-                say!("{series}");
-            }
-            let frame = Some((frame, &mut first_stage));
-            let context =
-                Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
-            picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
-            if cancel.is_cancelled() {
-                break;
-            }
-        }
-    } else {
-        let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
-        match arguments.staging.turntable() {
-            None => {
-                let context =
-                    Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
-                picture(context, desc, &mut diagnostics, None, &mut from_first)?;
-            }
-            Some(frames) => {
-                for turn in 0..frames {
-                    stage.turns = Some(f64::from(turn) / f64::from(frames));
-                    // The time of the first one includes reading.
-                    let start = if turn == 0 { start } else { Instant::now() };
-                    signals.end_at(arguments.deadline(start));
-                    let series = Series { number: turn + 1, done: turn, count: frames, start: render_start };
-                    let frame = Frame { number: turn + 1, is_first: turn == 0, series };
-                    // Each rotation has its own camera.
-                    let frame = Some((frame, &mut FirstStage::default()));
-                    let desc = desc.clone();
-                    let context = Context {
-                        arguments,
-                        stage: &stage,
-                        start,
-                        cancel: &cancel,
-                        signals: &signals,
-                        denoiser,
-                    };
-                    picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
-                    if cancel.is_cancelled() {
-                        break;
-                    }
-                }
-            }
+    let mut first = First { pattern: None, exposure: arguments.exposure, animation };
+    let context = Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
+    match (&arguments.frames, arguments.staging.turntable()) {
+        (Some(Frames(numbers)), _) => frames(context, numbers, &mut first)?,
+        (None, Some(count)) => turntable(context, count, &mut first)?,
+        (None, None) => {
+            let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
+            picture(context, desc, &mut diagnostics, None, &mut first)?;
         }
     }
-    if let Some(animation) = from_first.animation {
+    if let Some(animation) = first.animation {
         animation.finish()?;
     }
     match signals.received() {
         Some(status) => Err(Failure::Interrupted(status)),
         None => Ok(()),
     }
+}
+
+/// Renders frames of an animation, each read at its own time.
+fn frames(context: Context<'_>, numbers: &RangeInclusive<u32>, first: &mut First) -> Result<(), Failure> {
+    let Context { arguments, signals, .. } = context;
+    let mut first_stage = FirstStage::default();
+    let count = numbers.end() - numbers.start() + 1;
+    for number in numbers.clone() {
+        let start = Instant::now();
+        signals.end_at(arguments.deadline(start));
+        signals.enter(READING);
+        let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
+        let done = number - numbers.start();
+        let series = Series { number, done, count, start: context.start };
+        if !arguments.quiet {
+            say!("{series}");
+        }
+        let frame = Some((Frame { number, is_first: done == 0, series }, &mut first_stage));
+        picture(Context { start, ..context }, desc, &mut diagnostics, frame, first)?;
+        if context.cancel.is_cancelled() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Renders views from all around, one turn.
+fn turntable(context: Context<'_>, count: u32, first: &mut First) -> Result<(), Failure> {
+    let Context { arguments, signals, .. } = context;
+    let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
+    for done in 0..count {
+        let mut stage = context.stage.clone();
+        stage.turns = Some(f64::from(done) / f64::from(count));
+        // The time of the first one includes reading.
+        let start = if done == 0 { context.start } else { Instant::now() };
+        signals.end_at(arguments.deadline(start));
+        let series = Series { number: done + 1, done, count, start: context.start };
+        let frame = Frame { number: done + 1, is_first: done == 0, series };
+        // Each rotation has its own camera.
+        let frame = Some((frame, &mut FirstStage::default()));
+        picture(Context { stage: &stage, start, ..context }, desc.clone(), &mut diagnostics, frame, first)?;
+        if context.cancel.is_cancelled() {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// Minimum render time, even if reading took all of the time.
