@@ -12,9 +12,9 @@
 //!     let turns = Some(f64::from(frame) / 36.0);
 //!     let mut stage = Stage::default();
 //!     (stage.turns, stage.ground) = (turns, Ground::Shadow);
-//!     stage.set(&mut desc);
+//!     let prepared = lumbre::prepare(&mut desc, &stage, None);
 //!     let scene = Scene::from_description(desc)?;
-//!     let mut options = scene.options();
+//!     let mut options = prepared.options(&scene, None, None);
 //!     options.transparent = true;
 //!     let paper = Background::Colour(lumbre::image::Rgb::WHITE);
 //!     scene.render(&options)?.over(paper).save(format!("frame.{frame:04}.png"))?;
