@@ -197,7 +197,7 @@ pub fn run(words: Vec<OsString>) -> u8 {
     let outcome = match arguments.command {
         Command::Render(mut arguments) => {
             arguments.pass_options_to_reader();
-            render::run(&arguments)
+            render::series::run(&arguments)
         }
         Command::View(arguments) => viewing::run(*arguments),
         Command::Cast(arguments) => cast::run(&arguments),
