@@ -481,7 +481,7 @@ fn curves_that_differ_in_their_points_alone_are_one_shape() {
            ReverseOrientation
            Shape "curve" "string type" "cylinder" "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]
            Shape "curve" "string type" "ribbon" "normal N" [0 0 1 0 1 0] "point3 P" [0 0 0 1 0 0 1 1 0 2 2 0]
-           Shape "sphere""#,
+           Material "diffuse" Shape "sphere""#,
     );
     let curves = |i: usize| {
         let GeometryDesc::Curves(curves) = &scene.shapes[i].geometry else { panic!("{i}") };
@@ -517,7 +517,8 @@ fn normals_of_other_curves_than_ribbons_are_ignored() {
 #[test]
 fn hair_is_coloured_by_one_of_its_parameters() {
     let colour = |text: &str| {
-        let scene = world(&format!("Material \"hair\" {text} Shape \"sphere\""));
+        let curve = "Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 1 1 0 2 2 0]";
+        let scene = world(&format!("Material \"hair\" {text} {curve}"));
         let MaterialKind::Hair(params) = kind(&scene, 0) else { panic!() };
         params.clone()
     };
@@ -538,9 +539,8 @@ fn hair_is_coloured_by_one_of_its_parameters() {
     }
     let HairColour::Absorption(sigma) = colour("\"rgb sigma_a\" [1 2 30]").colour else { panic!() };
     assert_eq!(constant(&sigma), Rgb::new(1.0, 2.0, 30.0));
-    let (_, warnings) = warned(
-        r#"Material "hair" "rgb sigma_a" [1 2 3] "float eumelanin" 1 "rgb color" [1 1 1] Shape "sphere""#,
-    );
+    let (_, warnings) =
+        warned(r#"Material "hair" "rgb sigma_a" [1 2 3] "float eumelanin" 1 "rgb color" [1 1 1]"#);
     assert_eq!(warnings.len(), 2, "{warnings:?}");
     assert!(warnings[0].ends_with("\"color\" is not used where \"sigma_a\" is given"), "{warnings:?}");
 }
@@ -1625,4 +1625,66 @@ fn subsurface_and_openpbr_take_their_parameters_by_name() {
     let (_, warnings) =
         warned(r#"Material "openpbr" "float subsurface_weight" 1 "rgb coat_color" [1 .5 1] Shape "sphere""#);
     assert!(warnings.len() == 2 && warnings[0].contains("subsurface_weight"), "{warnings:?}");
+}
+
+// What is of pbrt alone.
+
+#[test]
+fn a_list_is_zero_outside_its_wavelengths() {
+    let scene = world(
+        r#"Material "diffuse" "spectrum reflectance" [450 0.5 650 0.5] Shape "sphere"
+           Material "diffuse" "spectrum reflectance" [350 0.5 850 0.5] Shape "sphere"
+           Material "dielectric" "spectrum eta" [600 1.5 700 1.4] Shape "sphere"
+           Material "diffuse" "spectrum reflectance" "metal-Cu-eta" Shape "sphere""#,
+    );
+    let reflectance = |shape: usize| match kind(&scene, shape) {
+        MaterialKind::Diffuse { reflectance } => match &**reflectance {
+            Texture::Spectrum { value, spectrum } => (*value, spectrum.clone()),
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
+    };
+    let (part, spectrum) = reflectance(0);
+    let at = [449.0, 450.0, 550.0, 650.0, 651.0, 830.0].map(|nm| spectrum.at(nm));
+    assert_eq!(at, [0.0, 0.5, 0.5, 0.5, 0.0, 0.0].map(Some));
+    assert!(part.r < 0.5 && part.b < 0.45, "{part:?}");
+    let (whole, spectrum) = reflectance(1);
+    near_rgb(whole, [0.5; 3]);
+    assert_eq!([360.0, 830.0].map(|nm| spectrum.at(nm)), [Some(0.5); 2]);
+    // Without an index at the yellow line there is no boundary.
+    let MaterialKind::Dielectric { eta, .. } = kind(&scene, 2) else { panic!() };
+    assert_eq!(*eta, 1.0);
+    // A known name goes on.
+    assert!(reflectance(3).1.at(360.0).unwrap() > 0.0);
+}
+
+#[test]
+fn a_grid_of_pbrt_v3_is_one_of_pbrt_v4_with_other_coefficients() {
+    let medium = |text: &str| {
+        let (scene, warnings) = warned(&format!("MakeNamedMedium \"m\" {text}"));
+        (format!("{:?}", scene.media[0]), warnings)
+    };
+    let voxels = r#""integer nx" 2 "float density" [0.5 2] "float g" 0.2"#;
+    let milk = r#""rgb sigma_a" [0.0011 0.0024 0.014] "rgb sigma_s" [2.55 3.21 3.77]"#;
+    let old = medium(&format!(r#""string type" "heterogeneous" {voxels}"#));
+    assert_eq!(old.1.len(), 1, "{:?}", old.1);
+    let new = medium(&format!(r#""string type" "uniformgrid" {voxels} {milk}"#));
+    assert_eq!((old.0, new.1.len()), (new.0, 0));
+    let old = medium(&format!(r#""string type" "heterogeneous" {voxels} "string preset" "Coke""#));
+    let coke = r#""rgb sigma_a" [0.10014 0.16503 0.2468] "rgb sigma_s" [8.9053e-05 8.372e-05 0]"#;
+    assert_eq!(old.0, medium(&format!(r#""string type" "uniformgrid" {voxels} {coke}"#)).0);
+}
+
+#[test]
+fn what_has_no_effect_is_said() {
+    let medium = r#"MakeNamedMedium "m" "string type" "homogeneous" "string preset" "Coke""#;
+    let (_, said) = warned(&format!("{medium} \"rgb sigma_a\" [1 1 1]"));
+    assert_eq!(said, ["warning: scene.pbrt:1:82: \"sigma_a\" is not used where a preset is given"],);
+    let hair = r#"Material "hair" Shape "curve" "point3 P" [0 0 0 1 0 0 2 0 0 3 0 0]"#;
+    assert_eq!(warned(hair).1, [""; 0]);
+    let (_, said) = warned(&format!("{hair} Shape \"sphere\" Shape \"sphere\""));
+    assert_eq!(
+        said,
+        ["warning: scene.pbrt:1:12: hair on a shape that is no curve: its v says where light meets a fibre"],
+    );
 }

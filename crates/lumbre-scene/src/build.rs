@@ -88,7 +88,8 @@ impl Scene {
         } else {
             cameras
         };
-        if lights.is_empty() && !builder.entries.iter().any(SurfaceEntry::is_emissive) {
+        let glows = uses_media && media.iter().any(|medium| medium.glows());
+        if lights.is_empty() && !glows && !builder.entries.iter().any(SurfaceEntry::is_emissive) {
             builder.warnings.push(BuildWarning::NoLight);
         }
         builder.place_lights(lights)?;
@@ -152,7 +153,8 @@ impl Scene {
         let surfaces = self.lights().iter().take_while(|light| light.is_surface()).cloned().collect();
         let warnings = self.warnings.iter().filter(|warning| !warning.is_of_lights()).cloned().collect();
         let mut builder = Builder { lights: surfaces, warnings, ..Builder::default() };
-        if lights.is_empty() && !self.entries.iter().any(SurfaceEntry::is_emissive) {
+        let glows = self.media.media.iter().any(|medium| medium.glows());
+        if lights.is_empty() && !glows && !self.entries.iter().any(SurfaceEntry::is_emissive) {
             builder.warnings.push(BuildWarning::NoLight);
         }
         let moves =

@@ -271,8 +271,11 @@ pub(crate) fn wants_studio(desc: &SceneDesc) -> bool {
     }
 }
 
-/// Whether any shape emits light.
+/// Whether any shape or medium emits light.
 fn is_emissive(desc: &SceneDesc) -> bool {
+    if desc.media.iter().any(|medium| medium.glows()) {
+        return true;
+    }
     let in_objects = desc.objects.iter().flat_map(|object| &object.shapes);
     let mut open: Vec<&ShapeDesc> = desc.shapes.iter().chain(in_objects).collect();
     while let Some(shape) = open.pop() {

@@ -11,7 +11,7 @@ use crate::{BsdfSample, LocalDir, Spectrum, fresnel};
 /// it loses energy as α grows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Conductor {
-    /// Real part of the index.
+    /// Real part of the index; negative in a channel that reflects more than all ([`fresnel::conductor_channel`]).
     pub eta: Spectrum,
     /// Imaginary part of the index, ≥ 0; infinite reflects everything.
     pub k: Spectrum,

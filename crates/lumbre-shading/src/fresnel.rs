@@ -23,7 +23,8 @@ pub fn dielectric<R: Real>(cos_i: R, eta: R) -> R {
 /// The reflectance of a metal of index `eta + i k` (over that of its surroundings) at one wavelength, `cos_i` ≥
 /// 0.
 ///
-/// An infinite `k` reflects everything. Source: the Fresnel equations with a complex index, in the real form of
+/// An infinite `k` reflects everything. A negative `eta` stands for a channel that reflects more than all of its light, as
+/// red does of gold, whose colour no three channels hold: `1 - eta` at normal incidence, and 1 at grazing. Source: the Fresnel equations with a complex index, in the real form of
 /// Born and Wolf, "Principles of Optics", 7th ed., 1999, section 14.2.
 #[inline(always)]
 pub fn conductor_channel<R: Real>(cos_i: R, eta: R, k: R) -> R {
@@ -46,7 +47,8 @@ pub fn conductor_channel<R: Real>(cos_i: R, eta: R, k: R) -> R {
     let reflectance = R::select(is_undefined, R::one().or_zero(is_border), partial);
     // Beyond this the reflectance is within 4·10⁻⁴ of 1 except at grazing angles, and k⁴ approaches the end of
     // the range.
-    R::select(k.simd_gt(R::splat(1e4)), R::one(), reflectance)
+    let reflectance = R::select(k.simd_gt(R::splat(1e4)), R::one(), reflectance);
+    R::select(eta.simd_lt(R::zero()), R::one() - eta * cos_i, reflectance)
 }
 
 /// [`conductor_channel`] for each channel, in lanes.

@@ -835,8 +835,11 @@ fn by_index(
     facets: Microfacets,
 ) -> Conductor {
     let not_negative = |c: Spectrum| c.map(|c| c.max(0.0));
+    let index = eta.evaluate_unbounded(at);
+    // Of known metals alone a channel may reflect more than all.
+    let is_spectrum = matches!(eta, SpectrumTexture::Spectrum { .. });
     Conductor {
-        eta: not_negative(eta.evaluate_unbounded(at)),
+        eta: if is_spectrum { index } else { not_negative(index) },
         k: not_negative(k.evaluate_unbounded(at)),
         facets,
     }

@@ -475,3 +475,48 @@ fn a_scene_file_without_light_is_black() {
     let text = "WorldBegin\nShape \"sphere\"";
     assert!(open(None, text).is_dark());
 }
+
+#[test]
+fn voxels_with_colours_of_their_own_shine_in_the_units_of_pbrt() {
+    // One voxel: coefficient and radiance fall from the middle to half on the faces.
+    let (absorption, radiance) = (1.5, [0.002, 0.004, 0.001]);
+    let world = format!(
+        r#"MakeNamedMedium "m" "string type" "rgbgrid" "point3 p0" [-1 -1 0] "point3 p1" [1 1 1]
+           "rgb sigma_a" [{absorption} {absorption} {absorption}] "rgb sigma_s" [0 0 0]
+           "rgb Le" [{} {} {}] "float Lescale" 2
+        MediumInterface "m" "" Material "interface"
+        Shape "box" "point3 p0" [-1 -1 0] "point3 p1" [1 1 1]"#,
+        radiance[0], radiance[1], radiance[2]
+    );
+    let (mut depth, mut shine) = (0.0_f64, 0.0);
+    const STEPS: u32 = 4096;
+    for i in 0..STEPS {
+        let share = 1.0 - ((f64::from(i) + 0.5) / f64::from(STEPS) - 0.5).abs();
+        let step = absorption * share / f64::from(STEPS);
+        shine += (-depth).exp() * (1.0 - (-step).exp()) * share;
+        depth += step;
+    }
+    let found = seen(None, "\"volpath\"", [0.0, 0.0, -3.0], [0.0, 0.0, 0.0], &world);
+    for (found, radiance) in found.into_iter().zip(radiance) {
+        let expected = 106.856_895 * 2.0 * radiance * shine;
+        assert!((found / expected - 1.0).abs() < 0.02, "{found}, expected {expected}");
+    }
+    // It is light of its own: the scene is not dark.
+    let text = format!("WorldBegin\n{world}");
+    assert!(!open(None, &text).is_dark());
+    let without = text.replace("\"float Lescale\" 2", "\"float Lescale\" 0");
+    assert!(open(None, &without).is_dark());
+}
+
+#[test]
+fn the_illuminance_of_a_square_map_is_twice_what_is_asked_for_as_in_pbrt() {
+    for (width, factor) in [(64, 2.0), (128, 1.0)] {
+        let name = "map.pfm";
+        let folder = folder_with(&[(name, Image::filled(width, 64, Rgb::splat(0.3)))]);
+        let world =
+            format!("LightSource \"infinite\" \"string filename\" \"{name}\" \"float illuminance\" 5");
+        let found = seen(Some(folder.path()), "\"path\"", [0.0; 3], [0.0, 0.6, 1.0], &world);
+        let expected = factor * 5.0 / PI;
+        assert!((found[0] / expected - 1.0).abs() < 2e-3, "{width}: {found:?}, expected {expected}");
+    }
+}

@@ -99,9 +99,13 @@ impl Dependencies {
         for (name, text) in linked {
             texts.entry(text.clone()).or_default().push((*name).to_owned());
         }
-        for package in self.packages.iter().filter(|package| package.sum.is_some()) {
+        for package in &self.packages {
             let title = format!("{} {}", package.name, package.version);
             let files = licence_files(&package.folder)?;
+            // Those of Lumbre bring a text where they hold the work of others.
+            if package.sum.is_none() && files.is_empty() {
+                continue;
+            }
             let may_be = |known: &str| package.licence.split(' ').any(|licence| licence == known);
             let remark = match files.is_empty() {
                 false => "",
@@ -216,6 +220,13 @@ mod tests {
         assert!(dependencies.packages.iter().all(|package| !package.licence.is_empty()));
         let notices = dependencies.notices(&[]).expect("every text");
         assert!(notices.contains("| glam ") && notices.contains("Permission is hereby granted"));
+        // The work of others that is in packages of Lumbre.
+        let shading = format!("| lumbre-shading {VERSION} | (MIT OR Apache-2.0) AND BSD-3-Clause |");
+        assert!(notices.contains(&shading), "{notices}");
+        assert!(notices.contains("Copyright (c) 2012 - 2013, Lukas Hosek and Alexander Wilkie"));
+        let formats = format!("| lumbre-formats {VERSION} | (MIT OR Apache-2.0) AND Apache-2.0 |");
+        assert!(notices.contains(&formats) && notices.contains("PhysLight"), "{notices}");
+        assert!(!notices.contains("| lumbre-kernel "));
         let bom: Value = serde_json::from_str(&dependencies.sbom()).expect("JSON");
         let refs: BTreeSet<&str> =
             array(&bom["components"]).filter_map(|component| component["bom-ref"].as_str()).collect();

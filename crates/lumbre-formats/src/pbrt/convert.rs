@@ -505,6 +505,7 @@ impl<'b, 'd> Converter<'b, 'd> {
                 self.note(spot, "an interface gives no light: the area light of this shape is left out");
             }
         }
+        self.check_hair();
         let mut known = Completion { alphas, is_interface, meshes, operands: HashMap::new() };
         self.scene.shapes.iter_mut().for_each(|shape| known.complete(shape));
         for slot in &mut self.objects {
@@ -586,6 +587,31 @@ impl<'b, 'd> Converter<'b, 'd> {
             }
         }
         Ok(all)
+    }
+
+    /// Says which materials of hair are on shapes that are no fibres.
+    fn check_hair(&mut self) {
+        let is_hair = |slot: &MaterialSlot| {
+            let material = slot.material.as_deref().expect("names are checked");
+            matches!(material.kind, lumbre_shading::MaterialKind::Hair(_))
+        };
+        if !self.materials.iter().any(is_hair) {
+            return;
+        }
+        let of_objects = self.objects.iter().flat_map(|slot| &slot.object).flat_map(|object| &object.shapes);
+        let is_fibre = |shape: &&ShapeDesc| matches!(shape.geometry, GeometryDesc::Curves(_));
+        let others = self.scene.shapes.iter().chain(of_objects).filter(|shape| !is_fibre(shape));
+        let mut places: Vec<SourcePosition> = others
+            .filter_map(|shape| Some(&self.materials[shape.material?.0 as usize]))
+            .filter(|slot| is_hair(slot))
+            .map(|slot| slot.first_use)
+            .collect();
+        places.sort_by_key(|spot| (spot.file, spot.line, spot.column));
+        places.dedup_by_key(|spot| (spot.file, spot.line, spot.column));
+        for spot in places {
+            let message = "hair on a shape that is no curve: its v says where light meets a fibre";
+            self.note(spot, message);
+        }
     }
 
     fn check_names(&mut self) -> Result<()> {

@@ -241,6 +241,10 @@ fn parameters(kind: &str, noun: &str, ty: &str) -> (Fate, BTreeMap<String, Fate>
     learn(first, &owner, "", &mut known, &mut queue);
     let mut fates = BTreeMap::new();
     while let Some(name) = queue.pop() {
+        if kind == "media" && name == "type" {
+            // It is the type itself.
+            continue;
+        }
         let Known { types, choices, context } = known[name].clone();
         let types = if types.is_empty() { TYPES.to_vec() } else { types };
         let mut best: Option<Fate> = None;

@@ -223,7 +223,12 @@ impl Converter<'_, '_> {
                 let message = "an illuminance is asked of an environment whose upper half is black";
                 return Err(params.spot_of("illuminance").error(message));
             }
-            scale *= (lux / found) as f32;
+            // In pbrt-v4 each pixel of a square map counts for half of what it shines.
+            let counted = match mapping {
+                EnvironmentMapping::EqualArea => 0.5 * found,
+                EnvironmentMapping::LatitudeLongitude => found,
+            };
+            scale *= (lux / counted) as f32;
         }
         // The edge of a latitude-longitude map is towards +x, as converters for pbrt write it; in our
         // description that is the middle.

@@ -386,7 +386,11 @@ impl Converter<'_, '_> {
             Some(param) if matches!(param.ty, Type::Float | Type::Integer) => single(params, name, default)?,
             Some(_) => match self.spectrum_value(params, name, SpectrumUse::Coefficient)? {
                 Some(value) => {
-                    let index = value.index_of_refraction();
+                    // Outside its wavelengths a list is 0, and there is no boundary, as in pbrt-v4.
+                    let index = match value.index_of_refraction() {
+                        0.0 if matches!(value, SpectrumValue::Sampled(_)) => 1.0,
+                        index => index,
+                    };
                     // The F and C lines of hydrogen.
                     if let (Some(blue), Some(red)) = (value.at(486.1), value.at(656.3)) {
                         dispersion = (20.0 * (blue - red) / (f64::from(index) - 1.0)) as f32;

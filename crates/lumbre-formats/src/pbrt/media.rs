@@ -26,6 +26,9 @@ pub(super) const MEDIA: [&str; 5] = ["homogeneous", "uniformgrid", "rgbgrid", "c
 /// What says how a medium glows by its temperature, and does nothing without.
 const OF_HEAT: [&str; 3] = ["temperatureoffset", "temperaturecutoff", "temperaturescale"];
 
+/// The integral of the observer's ȳ, by which pbrt-v4 divides the light of all but voxels with colours of their own.
+const OF_VOXELS: f64 = 106.856_895;
+
 /// Beyond this, light goes all but straight on or back.
 const MAX_ASYMMETRY: f64 = 0.99;
 
@@ -76,6 +79,10 @@ impl Converter<'_, '_> {
         match &*ty {
             "homogeneous" => self.homogeneous(params),
             "uniformgrid" => self.uniform_grid(params, world_from_medium),
+            "heterogeneous" => {
+                self.upgraded(params.spot);
+                self.old_grid(params, world_from_medium)
+            }
             "rgbgrid" => self.rgb_grid(params, world_from_medium),
             "cloud" => self.cloud(params, world_from_medium),
             "nanovdb" => self.nanovdb(params, world_from_medium),
@@ -100,22 +107,11 @@ impl Converter<'_, '_> {
         let scale = params.float_at_least_zero("scale", 1.0)? as f32;
         let named = match params.string("preset")?.map(str::to_owned) {
             None => None,
-            Some(name) => {
-                let found = preset(&name);
-                if found.is_none() {
-                    let wrong = Diagnostic::warning(format!("unknown preset {}", quoted(&name)));
-                    let wrong = wrong.suggest(&name, preset_names());
-                    self.warn(params.spot_of("preset"), wrong.expected("the name of a measured medium"));
-                }
-                found
-            }
+            Some(name) => self.preset_of(params, &name),
         };
         let (mut scattering_spectrum, mut absorption_spectrum) = (None, None);
         let (scattering, absorption) = match named {
-            Some(coefficients) => {
-                params.ignore(&["sigma_a", "sigma_s"]);
-                coefficients
-            }
+            Some(coefficients) => coefficients,
             None => {
                 let (scattering, absorption);
                 (scattering, scattering_spectrum) = self.coefficient(params, "sigma_s")?;
@@ -136,7 +132,58 @@ impl Converter<'_, '_> {
         })
     }
 
+    /// The coefficients of scattering and absorption of a measured medium, in place of those that are given.
+    fn preset_of(&mut self, params: &Params, name: &str) -> Option<(Spectrum, Spectrum)> {
+        let Some(coefficients) = preset(name) else {
+            let wrong = Diagnostic::warning(format!("unknown preset {}", quoted(name)));
+            let wrong = wrong.suggest(name, preset_names());
+            self.warn(params.spot_of("preset"), wrong.expected("the name of a measured medium"));
+            return None;
+        };
+        for name in ["sigma_a", "sigma_s"] {
+            if params.has(name) {
+                params.ignore(&[name]);
+                let message = format!("{} is not used where a preset is given", quoted(name));
+                self.note(params.spot_of(name), message);
+            }
+        }
+        Some(coefficients)
+    }
+
     fn uniform_grid(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
+        let (absorption, of_absorption) = self.coefficient(params, "sigma_a")?;
+        let (scattering, of_scattering) = self.coefficient(params, "sigma_s")?;
+        let values = [(absorption, of_absorption), (scattering, of_scattering)];
+        self.grid_with(params, world_from_medium, values)
+    }
+
+    /// pbrt-v3's grid, whose coefficients are those of whole milk by default, or of a preset.
+    fn old_grid(&mut self, params: &Params, world_from_medium: Transform) -> Result<Medium> {
+        let named = match params.string("preset")?.map(str::to_owned) {
+            None => None,
+            Some(name) => self.preset_of(params, &name),
+        };
+        let (scattering, absorption) = match named {
+            Some(coefficients) => coefficients,
+            None => {
+                let mut given = |name, default| -> Result<(Spectrum, Option<SpectrumValue>)> {
+                    if params.has(name) { self.coefficient(params, name) } else { Ok((default, None)) }
+                };
+                let scattering = given("sigma_s", Spectrum::new(2.55, 3.21, 3.77))?;
+                let absorption = given("sigma_a", Spectrum::new(0.0011, 0.0024, 0.014))?;
+                return self.grid_with(params, world_from_medium, [absorption, scattering]);
+            }
+        };
+        self.grid_with(params, world_from_medium, [(absorption, None), (scattering, None)])
+    }
+
+    /// A grid with these coefficients, of absorption and of scattering.
+    fn grid_with(
+        &mut self,
+        params: &Params,
+        world_from_medium: Transform,
+        [(absorption, of_absorption), (scattering, of_scattering)]: [(Spectrum, Option<SpectrumValue>); 2],
+    ) -> Result<Medium> {
         let size = size(params)?;
         let Some(density) = self.voxels(params, "density", size)? else {
             let wrong = Diagnostic::error(format!("{} has no density", params.owner));
@@ -144,8 +191,6 @@ impl Converter<'_, '_> {
         };
         let scale = params.float_at_least_zero("scale", 1.0)? as f32;
         let (glow, curve) = self.grid_glow(params, size)?;
-        let (absorption, of_absorption) = self.coefficient(params, "sigma_a")?;
-        let (scattering, of_scattering) = self.coefficient(params, "sigma_s")?;
         let coefficients = Coefficients::Scaled {
             density: Density::Grid(density),
             absorption: absorption * scale,
@@ -166,7 +211,7 @@ impl Converter<'_, '_> {
                 .wrong(wrong.expected("\"rgb sigma_a\" or \"rgb sigma_s\" of all voxels")));
         }
         let radiance = self.coloured_voxels(params, "Le", size, SpectrumUse::Light)?;
-        let scale = params.float_at_least_zero("Lescale", 1.0)? as f32;
+        let scale = (params.float_at_least_zero("Lescale", 1.0)? * OF_VOXELS) as f32;
         let glow = match radiance {
             None => Glow::None,
             Some(_) if absorption.is_none() => {
@@ -204,23 +249,35 @@ impl Converter<'_, '_> {
         let input = Input::open(&path, self.budget).map_err(fault)?;
         let name = input.name().clone();
         let bytes = input.into_bytes();
-        let grid = |name_of: &'static str, default: &str, values: Values| -> Result<Option<NanoGrid>> {
-            let wanted = params.string(name_of)?.unwrap_or(default).to_owned();
-            let found = nanovdb::read(&bytes, &name, &wanted, values, self.budget).map_err(fault)?;
-            // A grid of the usual name may be missing, one that is asked for may not.
-            if found.is_none() && (wanted != default || name_of == "gridname") {
-                let names = nanovdb::grid_names(&bytes, &name, self.budget).map_err(fault)?;
-                let names: Vec<String> = names.iter().map(|name| quoted(name)).collect();
-                let wrong = Diagnostic::error(format!("the file has no grid {}", quoted(&wanted)));
-                let known =
-                    if names.is_empty() { "a file with grids".to_owned() } else { names.join(" or ") };
-                return Err(params.spot_of(name_of).wrong(wrong.expected(known)));
-            }
-            Ok(found)
+        let names = || -> Result<String> {
+            let names = nanovdb::grid_names(&bytes, &name, self.budget).map_err(fault)?;
+            let names: Vec<String> = names.iter().map(|name| quoted(name)).collect();
+            Ok(if names.is_empty() { "a file with grids".to_owned() } else { names.join(" or ") })
         };
-        let density = grid("gridname", "density", Values::NotNegative)?;
-        let temperature = grid("temperaturename", "temperature", Values::Finite)?;
-        let NanoGrid { grid: density, world_bounds: [mut low, mut high] } = density.expect("it is there");
+        let grid = |wanted: &str, values: Values| {
+            nanovdb::read(&bytes, &name, wanted, values, self.budget).map_err(fault)
+        };
+        let wanted = params.string("gridname")?.unwrap_or("density");
+        let Some(density) = grid(wanted, Values::NotNegative)? else {
+            let wrong = Diagnostic::error(format!("the file has no grid {}", quoted(wanted)));
+            return Err(params.spot_of("gridname").wrong(wrong.expected(names()?)));
+        };
+        let of_heat = params.string("temperaturename")?.unwrap_or("temperature").to_owned();
+        let temperature = grid(&of_heat, Values::Finite)?;
+        // A file may have no temperatures, but what is said of them has no effect then.
+        let of_missing = ["temperaturename", "Lescale"].into_iter().chain(OF_HEAT);
+        let missing = match temperature {
+            None => of_missing.clone().find(|name| params.has(name)),
+            Some(_) => None,
+        };
+        let without_heat = missing.map(|said| -> Result<(&str, Diagnostic)> {
+            let message = format!("the file has no grid {}: the medium does not glow", quoted(&of_heat));
+            Ok((said, Diagnostic::warning(message).expected(names()?)))
+        });
+        if let Some((said, message)) = without_heat.transpose()? {
+            self.warn(params.spot_of(said), message);
+        }
+        let NanoGrid { grid: density, world_bounds: [mut low, mut high] } = density;
         let factor = Factor::Constant(params.float_at_least_zero("Lescale", 1.0)? as f32);
         let glow = match temperature {
             None => {

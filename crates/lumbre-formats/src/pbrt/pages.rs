@@ -77,13 +77,13 @@ pub(super) fn special(page: &str, name: &str) -> Option<&'static str> {
         (_, "uv") => "0 0 1 0 0 1",
         (_, "indices") => "0 1 2",
         (_, "faceIndices") => "5",
-        ("uniformgrid", "density" | "temperature" | "Lescale") => "0.5",
+        ("uniformgrid" | "heterogeneous", "density" | "temperature" | "Lescale") => "0.5",
         ("measured", "filename") => r#""images/satin.bsdf""#,
         ("realistic", "lensfile") => r#""images/triplet.txt""#,
         ("realistic", "aperture") => r#""star""#,
         ("subsurface", "name") => r#""Skin1""#,
         ("nanovdb", "filename") => r#""images/cloud.nvdb""#,
-        ("homogeneous", "preset") => r#""Wholemilk""#,
+        ("homogeneous" | "heterogeneous", "preset") => r#""Wholemilk""#,
         (_, "encoding") => r#""linear""#,
         (_, "screenwindow") => "-1 1 -2 2",
         (_, "p1") => "3 4 5",
@@ -138,6 +138,10 @@ pub(super) fn scene(kind: &str, name: &str, params: &str) -> String {
             "WorldBegin ObjectBegin \"one\" Shape \"sphere\" ObjectEnd ObjectBegin \"other\" Shape \"box\" ObjectEnd\n\
              Shape \"{name}\" {params}"
         ),
+        "materials" if name == "hair" => {
+            let curve = "Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 1 1 0 2 2 0]";
+            format!("WorldBegin Material \"hair\" {params} {curve}")
+        }
         "materials" => format!(
             "WorldBegin MakeNamedMaterial \"one\" \"string type\" \"diffuse\"\n\
              MakeNamedMaterial \"other\" \"string type\" \"conductor\"\nMaterial \"{name}\" {params} Shape \"sphere\""

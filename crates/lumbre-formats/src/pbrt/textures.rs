@@ -686,6 +686,9 @@ fn whole<T: TextureValue>(
     Ok(Known { texture: Arc::new(texture), depth, leaves })
 }
 
+/// The wavelengths of rendering, in nm.
+const VISIBLE_NM: [f64; 2] = [360.0, 830.0];
+
 /// Wavelengths with their values, or what is wrong with them.
 fn pairs(numbers: &[f64]) -> std::result::Result<Vec<(f64, f64)>, &'static str> {
     let pairs: Vec<(f64, f64)> = numbers.chunks_exact(2).map(|c| (c[0], c[1])).collect();
@@ -697,6 +700,15 @@ fn pairs(numbers: &[f64]) -> std::result::Result<Vec<(f64, f64)>, &'static str> 
     }
     if pairs.iter().any(|(_, v)| !(0.0..=f64::from(f32::MAX)).contains(v)) {
         return Err("values that are not negative");
+    }
+    // As in pbrt-v4, a list is 0 outside its wavelengths.
+    let mut pairs = pairs;
+    let [(first, _), (last, _)] = [pairs[0], pairs[pairs.len() - 1]];
+    if first > VISIBLE_NM[0] {
+        pairs.insert(0, (first.next_down(), 0.0));
+    }
+    if last < VISIBLE_NM[1] {
+        pairs.push((last.next_up(), 0.0));
     }
     Ok(pairs)
 }

@@ -131,7 +131,8 @@ impl BlackbodyColours {
 /// Three channels cannot hold the spectrum, but can preserve the reflectance at normal incidence: η is the mean
 /// over each channel's wavelengths, and k is solved for so that the channel's reflectance
 /// ((η − 1)² + k²) / ((η + 1)² + k²) is that of the spectrum under D65. Where no k can (η alone reflects more), k is 0
-/// and η is adjusted. When either is a colour, both are taken channel by channel.
+/// and η is adjusted. A channel that reflects more than 1, as the colour is outside the gamut, has a negative η:
+/// [`crate::fresnel::conductor_channel`]. When either is a colour, both are taken channel by channel.
 pub fn conductor_rgb(eta: &SpectrumValue, k: &SpectrumValue) -> (Spectrum, Spectrum) {
     if matches!(eta, SpectrumValue::Rgb(_)) || matches!(k, SpectrumValue::Rgb(_)) {
         return (eta.unbounded_rgb(), k.unbounded_rgb());
@@ -143,6 +144,9 @@ pub fn conductor_rgb(eta: &SpectrumValue, k: &SpectrumValue) -> (Spectrum, Spect
     });
     let mean = eta.unbounded_rgb();
     let solve = |eta: f32, r: f32| {
+        if r > 1.0 {
+            return (1.0 - r, 0.0);
+        }
         let (eta, r) = (f64::from(eta), f64::from(r).clamp(0.0, 0.9999));
         let k2 = (r * (eta + 1.0).powi(2) - (eta - 1.0).powi(2)) / (1.0 - r);
         if k2 >= 0.0 {
@@ -180,12 +184,21 @@ fn interpolate(pairs: &[(f64, f64)], nm: f64) -> f64 {
     }
 }
 
-/// (x̄, ȳ, z̄) at a wavelength in nm within the table.
+/// (x̄, ȳ, z̄) at a wavelength in nm within the table: by the cubic through the four nearest entries, as the CIE advises
+/// between its entries. (Linear, a narrow line has a colour that is wrong by half a per cent.)
 fn matching(nm: f64) -> [f64; 3] {
-    let place = ((nm - FIRST_NM) / STEP_NM).clamp(0.0, (MATCHING.len() - 1) as f64);
-    let i = (place as usize).min(MATCHING.len() - 2);
+    let last = MATCHING.len() - 1;
+    let place = ((nm - FIRST_NM) / STEP_NM).clamp(0.0, last as f64);
+    let i = (place as usize).clamp(1, last - 2);
     let t = place - i as f64;
-    std::array::from_fn(|c| MATCHING[i][c] * (1.0 - t) + MATCHING[i + 1][c] * t)
+    let weights = [
+        -t * (t - 1.0) * (t - 2.0) / 6.0,
+        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+        -(t + 1.0) * t * (t - 2.0) / 2.0,
+        (t + 1.0) * t * (t - 1.0) / 6.0,
+    ];
+    let near = &MATCHING[i - 1..i + 3];
+    std::array::from_fn(|c| near.iter().zip(weights).map(|(entry, w)| entry[c] * w).sum::<f64>().max(0.0))
 }
 
 /// XYZ of a spectrum: the sum over every nanometre.
@@ -302,7 +315,8 @@ mod tests {
     fn the_standard_illuminants_have_their_published_chromaticity() {
         let published = [
             ("stdillum-A", 0.44758, 0.40745),
-            ("stdillum-D50", 0.34567, 0.35851),
+            // pbrt-v4's own table, not that of the CIE.
+            ("stdillum-D50", 0.33681, 0.35798),
             ("stdillum-D65", 0.31272, 0.32903),
             ("illum-acesD60", 0.32168, 0.33767),
             ("stdillum-F1", 0.3131, 0.3371),
@@ -323,6 +337,41 @@ mod tests {
             // (The published ones are sums every 5 nm, which the lines of a lamp are not quite the same over.)
             assert!((our_x - x).abs() < 6e-4 && (our_y - y).abs() < 6e-4, "{name}: {our_x} {our_y}");
         }
+    }
+
+    #[test]
+    fn lamps_have_the_colours_of_the_observer_at_every_nanometre() {
+        // Integrated with the observer's table for every nanometre, at luminance 1.
+        let expected = [
+            ("stdillum-A", [1.845, 0.82607, 0.23337]),
+            ("stdillum-D50", [1.0866, 0.99951, 0.74971]),
+            ("illum-acesD60", [1.0469, 0.99457, 0.91553]),
+            ("stdillum-F1", [0.95426, 1.0193, 0.94367]),
+            ("stdillum-F2", [1.3401, 0.94299, 0.56285]),
+            ("stdillum-F3", [1.5764, 0.89107, 0.38089]),
+            ("stdillum-F4", [1.8063, 0.8342, 0.26707]),
+            ("stdillum-F5", [0.91539, 1.0362, 0.89032]),
+            ("stdillum-F6", [1.3161, 0.95783, 0.4865]),
+            ("stdillum-F7", [1.0003, 1.0002, 0.9974]),
+            ("stdillum-F8", [1.1767, 0.97572, 0.72009]),
+            ("stdillum-F9", [1.3768, 0.9314, 0.56935]),
+            ("stdillum-F10", [1.1776, 0.97562, 0.71836]),
+            ("stdillum-F11", [1.4121, 0.92473, 0.53156]),
+            ("stdillum-F12", [1.7684, 0.84507, 0.27085]),
+        ];
+        for (name, colour) in expected {
+            let ours = named(name).illuminant_rgb().to_array();
+            let is_near = ours.iter().zip(colour).all(|(a, b)| (a / b - 1.0).abs() < 1e-3);
+            assert!(is_near, "{name}: {ours:?}, expected {colour:?}");
+        }
+    }
+
+    #[test]
+    fn a_step_between_wavelengths_has_its_colour() {
+        // Integrated for every nanometre.
+        let step = SpectrumValue::Sampled(vec![(360.0, 0.5), (550.0, 0.6), (551.0, 0.25), (830.0, 0.2)]);
+        let colour = step.reflectance_rgb();
+        assert!(close(colour, [0.096_938, 0.470_04, 0.569_12], 6e-5), "{colour:?}");
     }
 
     #[test]
@@ -444,7 +493,7 @@ mod tests {
                     })
                     .collect(),
             )
-            .reflectance_rgb();
+            .unbounded_rgb();
             let (eta, k) = conductor_rgb(&eta, &k);
             let ours = crate::fresnel::conductor(1.0, eta, k);
             assert!(close(ours, expected.to_array(), 2e-4), "{metal}: {ours:?} {expected:?}");
@@ -453,7 +502,10 @@ mod tests {
         assert_eq!(count, 7);
         let (eta, k) = conductor_rgb(&named("metal-Au-eta"), &named("metal-Au-k"));
         let gold = crate::fresnel::conductor(1.0, eta, k);
-        assert!(gold.r > 0.95 && (0.7..0.82).contains(&gold.g) && gold.b < 0.42, "{gold:?}");
+        // Integrated for every nanometre; red is outside the gamut.
+        assert!(close(gold, [1.0219, 0.78245, 0.3434], 1e-3), "{gold:?}");
+        let grazing = crate::fresnel::conductor(0.0, eta, k);
+        assert!(close(grazing, [1.0; 3], 1e-6), "{grazing:?}");
     }
 
     #[test]

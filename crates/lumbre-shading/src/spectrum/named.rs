@@ -5,12 +5,14 @@
 //!   dioxide are measurements as it publishes them. Brass (CuZn) is Querry, "Optical Constants", Contractor Report
 //!   CRDC-CR-85034, 1985, of 70 % copper and 30 % zinc. Magnesium oxide is Stephens and Malitson, "Index of Refraction
 //!   of Magnesium Oxide", Journal of Research of the National Bureau of Standards 49(4), 1952; it does not absorb.
-//! - CIE illuminants: CIE 15:2018. D50, D65 and the D60 of ACES follow the daylight formula.
+//! - CIE illuminants: CIE 15:2018. D65 and the D60 of ACES follow the daylight formula. `stdillum-D50` is that of pbrt-v4,
+//!   so that its scenes keep their colours: the formula without the negative values of S₁ and S₂, from 400 nm on. It is
+//!   greener than the CIE's D50, (0.3368, 0.3580) in place of (0.3457, 0.3585).
 
 use super::{fluorescent, interpolate};
 use lumbre_math::Elementary;
 
-/// A built-in spectrum. Beyond the wavelengths of its source it is constant; a fluorescent lamp is zero there.
+/// A built-in spectrum. Beyond the wavelengths of its source it is constant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NamedSpectrum {
     // The index in `TABLE`.
@@ -49,6 +51,9 @@ impl NamedSpectrum {
                 100.0 * shape(nm) / shape(560.0)
             }
             Source::Daylight((m1, m2)) => daylight(nm, m1, m2),
+            Source::PbrtD50 => {
+                by_daylight(nm, |[s0, s1, s2]| s0 + M_D50.0 * s1.max(0.0) + M_D50.1 * s2.max(0.0))
+            }
             Source::Lamp(number) => lamp(nm, number),
         }
     }
@@ -65,6 +70,8 @@ enum Source {
     IlluminantA,
     /// S₀ + M₁ S₁ + M₂ S₂.
     Daylight((f64, f64)),
+    /// The same for D50, with what is negative of S₁ and S₂ left out.
+    PbrtD50,
     /// A fluorescent lamp of the CIE, F1 being 1.
     Lamp(usize),
 }
@@ -84,21 +91,22 @@ pub(super) fn d65(nm: f64) -> f64 {
 }
 
 fn daylight(nm: f64, m1: f64, m2: f64) -> f64 {
+    by_daylight(nm, |[s0, s1, s2]| s0 + m1 * s1 + m2 * s2)
+}
+
+/// Linear between what is made of the entries of the formula.
+fn by_daylight(nm: f64, value: impl Fn([f64; 3]) -> f64) -> f64 {
     let place = ((nm - 360.0) / 10.0).clamp(0.0, (DAYLIGHT.len() - 1) as f64);
     let i = (place as usize).min(DAYLIGHT.len() - 2);
     let t = place - i as f64;
-    let value = |[s0, s1, s2]: [f64; 3]| s0 + m1 * s1 + m2 * s2;
     value(DAYLIGHT[i]) * (1.0 - t) + value(DAYLIGHT[i + 1]) * t
 }
 
-/// Linear between the entries, and zero beyond them.
+/// Linear between the entries, and constant beyond them.
 fn lamp(nm: f64, number: usize) -> f64 {
     let powers = &fluorescent::LAMPS[number - 1];
-    let place = (nm - fluorescent::FIRST_NM) / fluorescent::STEP_NM;
     let last = (powers.len() - 1) as f64;
-    if !(0.0..=last).contains(&place) {
-        return 0.0;
-    }
+    let place = ((nm - fluorescent::FIRST_NM) / fluorescent::STEP_NM).clamp(0.0, last);
     let i = (place as usize).min(powers.len() - 2);
     let t = place - i as f64;
     powers[i] * (1.0 - t) + powers[i + 1] * t
@@ -144,7 +152,7 @@ const TABLE: &[(&str, Source)] = &[
     ("metal-TiO2-eta", Source::Eta(TITANIUM_DIOXIDE)),
     ("metal-TiO2-k", Source::K(TITANIUM_DIOXIDE)),
     ("stdillum-A", Source::IlluminantA),
-    ("stdillum-D50", Source::Daylight(M_D50)),
+    ("stdillum-D50", Source::PbrtD50),
     ("stdillum-D65", Source::Daylight(M_D65)),
     ("stdillum-F1", Source::Lamp(1)),
     ("stdillum-F2", Source::Lamp(2)),
