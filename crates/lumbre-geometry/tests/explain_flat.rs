@@ -309,6 +309,20 @@ fn what_is_said_of_patches_is_so() {
         let misses = delta < 0 || (a, b) == (0, 0) && c != 0;
         said.hold("no ruling", has(&Remark::Misses), misses, &context);
         said.hold("one ruling", has(&Remark::Touches), delta == 0 && a != 0, &context);
+        // E(u) = e + u·f runs along a ruling: parallel to d for one u, and not on the line.
+        let (e, f) = (sub(q01, q00), sub(sub(q11, q10), sub(q01, q00)));
+        let (k, l) = (cross(e, d), cross(f, d));
+        let parallel_at = (0..3).find(|&i| l[i] != 0).map(|i| Fraction::new(-k[i], l[i]));
+        let is_parallel = |u: Fraction| {
+            let start: Whole = std::array::from_fn(|i| u.1 * q00[i] + u.0 * (q10[i] - q00[i]));
+            (0..3).all(|i| k[i] * u.1 + u.0 * l[i] == 0) && cross(start, d) != [0, 0, 0]
+        };
+        let is_said = has(&Remark::ParallelRuling);
+        if let Some(u) = parallel_at {
+            said.hold("parallel ruling", is_said, is_parallel(u) && (a, b) != (0, 0), &context);
+        } else {
+            said.hold("parallel ruling", is_said && k != [0; 3], false, &context);
+        }
         let winding = remarks(&explanation, Topic::Winding);
         let sides = [(q00, q10), (q10, q11), (q11, q01), (q01, q00)].map(|(p, q)| turn(p, q));
         said.hold("on an edge", winding.contains(&Remark::OnEdge), sides.contains(&0), &context);
@@ -331,6 +345,7 @@ fn what_is_said_of_patches_is_so() {
         "every ruling",
         "no ruling",
         "one ruling",
+        "parallel ruling",
         "on an edge",
         "lies in it",
         "misses",

@@ -307,6 +307,7 @@ fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
         Remark::EveryRuling => {
             "a = h = c = 0: every ruling of this family meets the line, which is one of the other family."
         }
+        Remark::ParallelRuling => "A ruling is parallel to the ray: they meet nowhere.",
         Remark::SchoolbookCount { crossings, roots } => {
             return format!(
                 "The rounded coefficients have another number of roots, {roots}, than there are crossings: {crossings}."
@@ -494,12 +495,24 @@ fn symbol(topic: Topic, symbol: &str, kind: &str) -> &'static str {
         (Topic::Shear, "i₃", _) => "coordinate axis, the one that the direction is longest along",
         (Topic::Winding, "σ", _) => "sign of each",
         (Topic::Winding, "n", _) => "how often the outline winds about the ray",
+        (Topic::Rulings, "w₁" | "w₂", _) => "u of a ruling that meets the ray",
+        (Topic::Roots, "x₄" | "y₄" | "x₇" | "y₇", "bilinear") => {
+            "where this ruling starts, as seen along the ray"
+        }
+        (Topic::Roots, "x₅" | "y₅" | "x₈" | "y₈", "bilinear") => "where it ends",
+        (Topic::Roots, "v′₁" | "v′₂", "bilinear") => "v of its point nearest to the ray",
+        (Topic::Roots, "x₆" | "y₆" | "x₉" | "y₉", "bilinear") => "how far that point is off the ray",
+        (Topic::Roots, "g₁" | "g₂" | "g₃" | "g₄", "bilinear") => "derivative along u",
+        (Topic::Roots, "A₁" | "A₂", "bilinear") => "area of the derivatives along u and along v",
         (Topic::Roots, "u₁" | "u₂" | "v₁" | "v₂", "bilinear") => {
             "place on the patch, after a step of Newton's method"
         }
         (Topic::Roots, "t₁" | "t₂", "bilinear") => "t there",
-        (Topic::Span, "t₁", "capsule") => "where the line enters",
-        (Topic::Span, "t₂", "capsule") => "where it leaves",
+        (Topic::Span, "I₀", "capsule") => "within the side, between both planes",
+        (Topic::Span, "I₁", "capsule") => "within the ball about the first end",
+        (Topic::Span, "I₂", "capsule") => "within the ball about the second end",
+        (Topic::Span, "t₁", "capsule") => "where the line enters: the first of all ends",
+        (Topic::Span, "t₂", "capsule") => "where it leaves: the last of all ends",
         (Topic::Intervals, "I", _) => "within the result",
         (Topic::Intervals, _, _) => "within the operand of this number",
         (Topic::Surface, "P", _) => "the point",
