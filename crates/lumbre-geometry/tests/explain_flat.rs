@@ -6,7 +6,8 @@
 use std::collections::BTreeMap;
 
 use lumbre_geometry::{
-    BilinearPatch, Cuboid, Disk, Explanation, Fate, Plane, Ray, Remark, Shape, Step, Topic, Torus, Triangle,
+    BilinearPatch, Capsule, Cone, Cuboid, Cylinder, Disk, Explanation, Fate, Plane, Ray, Remark, Shape,
+    Sphere, Step, Topic, Torus, Triangle,
 };
 use lumbre_math::DVec3;
 use lumbre_math::random::RandomStream;
@@ -135,6 +136,8 @@ fn what_is_said_of_planes_and_disks_is_so() {
             said.hold("in the plane", made.contains(&Remark::InPlane), is_in, &context);
             let loses = made.iter().any(|remark| matches!(remark, Remark::Cancellation { .. }));
             said.hold("loses digits", loses, false, &context);
+            // All products of whole numbers are exact.
+            said.hold("twice the precision", made.contains(&Remark::TwicePrecision), false, &context);
             assert_eq!(explanation.candidates.len(), usize::from(slope != 0), "{}", context());
             for candidate in &explanation.candidates {
                 let t = Fraction::new(away, slope);
@@ -162,6 +165,45 @@ fn what_is_said_of_planes_and_disks_is_so() {
         }
     }
     said.has_each(&["parallel", "in the plane", "beyond the rim", "in the hole", "behind", "hit"]);
+}
+
+#[test]
+fn where_nothing_is_rounded_nothing_is_said_of_rounding() {
+    let shapes: [Shape; 5] = [
+        Cylinder::along_z(2.0, -3.0, 4.0, true).unwrap().into(),
+        Cylinder::along_z(2.0, -3.0, 4.0, false).unwrap().into(),
+        Capsule::new(DVec3::new(1.0, 0.0, -4.0), DVec3::new(1.0, 0.0, 4.0), 2.0).unwrap().into(),
+        Cone::new(DVec3::ZERO, DVec3::new(0.0, 0.0, 4.0), 2.0, 0.0, false).unwrap().into(),
+        Sphere::new(DVec3::new(1.0, 2.0, -1.0), 2.0).unwrap().into(),
+    ];
+    let mut count = 0;
+    for shape in &shapes {
+        // Along the axis: in the middle, in the side, beside it; along a generator of the cone; and across, touching.
+        for (origin, d) in [
+            ([0, 0, -8], [0, 0, 1]),
+            ([2, 0, -8], [0, 0, 1]),
+            ([0, 3, -8], [0, 0, 2]),
+            ([2, 0, 0], [-1, 0, 2]),
+            ([2, -8, 0], [0, 1, 0]),
+            ([3, -8, 0], [0, 1, 0]),
+            ([1, -8, -4], [0, 1, 0]),
+        ] {
+            let ray = ray_of(origin, d);
+            let explanation = shape.explain(&ray);
+            for remark in explanation.steps.iter().flat_map(|step| &step.remarks) {
+                let is_of_rounding = matches!(
+                    remark,
+                    Remark::TwicePrecision
+                        | Remark::Cancellation { .. }
+                        | Remark::SchoolbookHits
+                        | Remark::SchoolbookMisses
+                );
+                assert!(!is_of_rounding, "{ray:?} {explanation:#?}");
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 20, "{count}");
 }
 
 #[test]
