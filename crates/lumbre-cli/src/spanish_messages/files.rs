@@ -203,4 +203,5 @@ pub(super) const FILES: &[(&str, &str)] = &[
     ("an AVIF or HEIF image", "una imagen AVIF o HEIF"),
     ("unsupported HDR format", "formato HDR no admitido"),
     ("unsupported HDR resolution", "resolución HDR no admitida"),
+    ("damaged {} image: its decoder gave up", "imagen {=} dañada: su decodificador no pudo seguir"),
 ];

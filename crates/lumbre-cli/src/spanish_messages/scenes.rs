@@ -2,7 +2,7 @@
 
 /// `{}` stands for what comes from the file, in the same order in both; `{=}` for what stays as it is.
 pub(super) const SCENES: &[(&str, &str)] = &[
-    ("unknown {} {}: {}", "{} {} no se conoce: {}"),
+    ("unknown {} {}", "{} {} no se conoce"),
     (
         "no file can be read from here, and the scene asks for {}",
         "desde aquí no se puede leer ningún archivo, y la escena pide {}",
@@ -457,4 +457,6 @@ pub(super) const SCENES: &[(&str, &str)] = &[
         "{}: --background transparent needs a picture that holds coverage",
         "{}: --background transparent necesita una imagen con cobertura",
     ),
+    ("shape {}", "forma {}"),
+    ("light {}", "luz {}"),
 ];
