@@ -313,7 +313,8 @@ impl ReadingArguments {
         let read = lumbre::describe(&paths, &options);
         let (mut desc, mut diagnostics) = read.map_err(|error| memory.explain(error))?;
         if let (None, Some(animation)) = (time, &self.animation) {
-            say!("the animation {animation} is shown at 0 s (--frame gives another time)");
+            let what = format!("the animation {animation} is shown at 0 s (--frame gives another time)");
+            diagnostics.push(Diagnostic::note(what));
         }
         self.warn_of_unused(&paths, &mut diagnostics)?;
         for path in &self.overlay {

@@ -339,7 +339,10 @@ pub(crate) fn said(error: &Error) -> String {
         ErrorKind::MissingRequiredArgument => format!("faltan argumentos obligatorios: {argument}"),
         ErrorKind::ArgumentConflict => {
             let other = text(ContextKind::PriorArg);
-            format!("'{argument}' no puede usarse con '{other}'")
+            match argument == other {
+                true => format!("'{argument}' se da más de una vez"),
+                false => format!("'{argument}' no puede usarse con '{other}'"),
+            }
         }
         ErrorKind::TooManyValues => format!("sobra el valor '{value}' de '{argument}'"),
         ErrorKind::TooFewValues | ErrorKind::WrongNumberOfValues => {

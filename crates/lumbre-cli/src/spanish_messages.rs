@@ -2,9 +2,31 @@
 //! readers say it.
 //!
 //! Readers write `PLACE: SENTENCE (found X; expected Y; did you mean Z?)`. A sentence that is not in the table stays as
-//! it is.
+//! it is. Of several entries that a text fits, the one with the most characters of its own holds.
 
-/// Sentences in both languages. `{}` stands for what comes from the scene, in the same order in both.
+mod counted;
+mod files;
+mod models;
+mod pov;
+mod scenes;
+
+use counted::COUNTED;
+use files::FILES;
+use models::MODELS;
+use pov::POV;
+use scenes::SCENES;
+
+type Table = &'static [(&'static str, &'static str)];
+
+/// The tables of sentences.
+const OF_SENTENCES: [Table; 5] = [SENTENCES, SCENES, MODELS, POV, FILES];
+/// The tables of what was found or expected.
+const OF_DETAILS: [Table; 5] = [DETAILS, SCENES, MODELS, POV, FILES];
+/// So many characters an entry has, beside its places, if it is a sentence.
+const LEAST_OF_A_SENTENCE: usize = 6;
+
+/// Sentences in both languages. `{}` stands for what comes from the scene, in the same order in both; `{=}` for what
+/// stays as it is.
 const SENTENCES: &[(&str, &str)] = &[
     ("unknown parameter {} of {}", "parámetro desconocido {} de {}"),
     ("unknown {} {}: it is left out", "{} {} no se conoce: se omite"),
@@ -186,6 +208,8 @@ const DETAILS: &[(&str, &str)] = &[
     ("more than {}", "más de {}"),
     ("less than {}", "menos de {}"),
     ("from {} to less than {}", "de {} a menos de {}"),
+    ("{} times {}", "{} por {}"),
+    ("{} times {} times {}", "{} por {} por {}"),
     ("degrees in (0, 360]", "grados en (0, 360]"),
     ("the names of two objects or more", "los nombres de dos objetos o más"),
     ("{} or more", "{} o más"),
@@ -238,10 +262,6 @@ const DETAILS: &[(&str, &str)] = &[
     ),
 ];
 
-/// How what is expected begins where it is more than one thing.
-const PLURALS: [&str; 14] =
-    ["2", "3", "4", "5", "6", "7", "8", "9", "10 n", "16 n", "pares ", "longitudes ", "grados ", "los "];
-
 /// Nouns of sentences before a quoted name.
 const NOUNS: &[(&str, &str)] = &[
     ("shape", "la forma"),
@@ -292,11 +312,29 @@ fn line_in_spanish(line: &str) -> String {
     let (sentence, details) = with_details(line);
     // The place comes first, and may hold a colon itself.
     let starts = std::iter::once(0).chain(sentence.match_indices(": ").map(|(at, _)| at + 2));
-    let known = starts.into_iter().find_map(|at| {
-        let spanish = by_table(SENTENCES, &sentence[at..]).or_else(|| of_system(&sentence[at..]))?;
-        Some(format!("{}{spanish}", &sentence[..at]))
+    // Of equals, the last is chosen, without the place.
+    let known = starts.filter_map(|at| {
+        let (known, spanish) = sentence_in_spanish(&sentence[at..])?;
+        let place = sentence[..at].replace(" by the macro ", " en la macro ");
+        Some((known, place + &spanish))
     });
+    let known = known.max_by_key(|&(known, _)| known).map(|(_, spanish)| spanish);
     format!("{}{}{more}", known.unwrap_or_else(|| sentence.to_owned()), details_in_spanish(details))
+}
+
+/// A sentence, which may be followed by its reason, in Spanish; and how many characters of it the tables have.
+fn sentence_in_spanish(text: &str) -> Option<(usize, String)> {
+    let known = |text| best(&OF_SENTENCES, text).filter(|&(known, _)| known >= LEAST_OF_A_SENTENCE);
+    let with_reason = text.match_indices(": ").filter_map(|(at, _)| {
+        let (known_of_it, sentence) = known(&text[..at])?;
+        let reason = &text[at + 2..];
+        let (more, reason) = sentence_in_spanish(reason)
+            .or_else(|| best(&OF_DETAILS, reason))
+            .unwrap_or_else(|| (0, reason.to_owned()));
+        Some((known_of_it + more, format!("{sentence}: {reason}")))
+    });
+    let whole = known(text).or_else(|| Some((1, of_system(text)?)));
+    with_reason.chain(whole).max_by_key(|&(known, _)| known)
 }
 
 /// A sentence, and what stands behind it in parentheses.
@@ -321,11 +359,13 @@ fn details_in_spanish(details: &str) -> String {
     let parts = starts.zip(ends).map(|(from, to)| {
         let part = &details[from..to];
         if let Some(found) = part.strip_prefix("found ") {
-            format!("se encontró {}", detail(found))
+            let found = detail(found);
+            format!("{} {found}", if is_plural(&found) { "se encontraron" } else { "se encontró" })
         } else if let Some(expected) = part.strip_prefix("expected ") {
             let expected = detail(expected);
-            let is_plural = PLURALS.iter().any(|begin| expected.starts_with(begin));
-            format!("{} {expected}", if is_plural { "se esperaban" } else { "se esperaba" })
+            let is_none = ["ning", "nada "].iter().any(|begin| expected.starts_with(begin));
+            let begin = if is_none { "no " } else { "" };
+            format!("{begin}{} {expected}", if is_plural(&expected) { "se esperaban" } else { "se esperaba" })
         } else {
             let name = part.trim_start_matches("did you mean ").trim_end_matches('?');
             format!("¿quería decir {name}?")
@@ -334,23 +374,61 @@ fn details_in_spanish(details: &str) -> String {
     format!(" ({})", parts.collect::<Vec<_>>().join("; "))
 }
 
+/// Whether this is more than one thing, in Spanish: several numbers, or a number of things.
+fn is_plural(expected: &str) -> bool {
+    const NOUNS: [&str; 12] = [
+        "dos ",
+        "tres ",
+        "cuatro ",
+        "pares ",
+        "longitudes ",
+        "grados ",
+        "números ",
+        "líneas ",
+        "nodos ",
+        "bytes ",
+        "datos ",
+        "los ",
+    ];
+    let after = expected.trim_start_matches(|c: char| c.is_ascii_digit());
+    let number = &expected[..expected.len() - after.len()];
+    let names_things = after.strip_prefix(' ').is_some_and(|noun| {
+        noun.starts_with(char::is_alphabetic) && !noun.starts_with("o ") && !noun.starts_with("a ")
+    });
+    NOUNS.iter().any(|noun| expected.starts_with(noun))
+        || !number.is_empty() && number != "1" && (names_things || after.starts_with(", "))
+}
+
 fn detail(text: &str) -> String {
     // A quotation from the scene is what it is.
     if text.starts_with('"') && text.ends_with('"') && text.matches('"').count() == 2 {
         return text.to_owned();
     }
-    by_table(DETAILS, text).unwrap_or_else(|| text.to_owned())
+    best(&OF_DETAILS, text).map_or_else(|| text.to_owned(), |(_, spanish)| spanish)
 }
 
-/// The translation of the first entry that a text fits.
-pub(crate) fn by_table(table: &[(&str, &str)], text: &str) -> Option<String> {
-    table.iter().find_map(|(english, spanish)| {
+/// The translation of the entry that a text fits best.
+pub(crate) fn by_table(table: Table, text: &str) -> Option<String> {
+    best(&[table], text).map(|(_, spanish)| spanish)
+}
+
+/// The translation of the entry of these tables that a text fits best, and how many characters that entry has beside its
+/// places.
+fn best(tables: &[Table], text: &str) -> Option<(usize, String)> {
+    let fitting = tables.iter().copied().flatten().filter_map(|&(english, spanish)| {
         let parts = fitted(english, text)?;
-        let parts = parts.iter().map(|part| part_in_spanish(part));
-        let mut pieces = spanish.split("{}");
-        let first = pieces.next().unwrap_or_default().to_owned();
-        Some(parts.zip(pieces).fold(first, |text, (part, piece)| text + &part + piece))
-    })
+        Some((english.len() - 2 * parts.len(), spanish, parts))
+    });
+    let (known, spanish, parts) = fitting.max_by_key(|&(known, ..)| known)?;
+    let mut pieces = spanish.split('{');
+    let mut translated = pieces.next().unwrap_or_default().to_owned();
+    for (part, piece) in parts.into_iter().zip(pieces) {
+        match piece.strip_prefix("=}") {
+            Some(piece) => translated.extend([part, piece]),
+            None => translated.extend([&part_in_spanish(part), piece.trim_start_matches('}')]),
+        }
+    }
+    Some((known, translated))
 }
 
 /// What stands for each `{}` of a pattern in a text that fits it.
@@ -387,10 +465,14 @@ fn of_system(text: &str) -> Option<String> {
     })
 }
 
-/// A part of a sentence: what the system says, a noun and its name, or what is the same in both languages.
+/// A part of a sentence: what the system says, a noun and its name, what a limit counts, another detail, or what is the
+/// same in both languages.
 fn part_in_spanish(part: &str) -> String {
     if let Some(said) = of_system(part) {
         return said;
+    }
+    if let Some((_, counted)) = COUNTED.iter().find(|(english, _)| part == *english) {
+        return (*counted).to_owned();
     }
     for (english, spanish) in NOUNS {
         if let Some(name) = part.strip_prefix(english).and_then(|rest| rest.strip_prefix(' ')) {
@@ -400,7 +482,7 @@ fn part_in_spanish(part: &str) -> String {
             return spanish.split_once(' ').map_or(*spanish, |(_, noun)| noun).to_owned();
         }
     }
-    part.to_owned()
+    detail(part)
 }
 
 #[cfg(test)]
@@ -427,6 +509,26 @@ mod tests {
                 "a.pbrt:2:1: valor incorrecto del parámetro \"L\" (se encontró el texto \"; expected x\"; se esperaban 3 números)\n  incluido desde b.pbrt:1:1",
             ),
             ("a.txt: Permission denied (os error 13)", "a.txt: permiso denegado (error 13 del sistema)"),
+            (
+                "a.gltf:1:40 /buffers/0/uri: b.bin: cannot open: No such file or directory (os error 2)",
+                "a.gltf:1:40 /buffers/0/uri: b.bin: no se puede abrir: no existe el archivo o la carpeta (error 2 del sistema)",
+            ),
+            (
+                "a.gltf:1:290 /accessors/0/count: accessor past the end of its buffer view (found 4 elements, which need 48 bytes; expected 36 bytes at most)",
+                "a.gltf:1:290 /accessors/0/count: el accesor pasa del final de su vista de búfer (se encontraron 4 elementos, que necesitan 48 bytes; se esperaban 36 bytes como máximo)",
+            ),
+            (
+                "a.ply:3:16: file is truncated: 1 face announced, room for 0",
+                "a.ply:3:16: el archivo está cortado: se anuncia 1 cara, hay sitio para 0",
+            ),
+            (
+                "a.ply:10:5: not a number in face 0, property z (found \"x\")",
+                "a.ply:10:5: no es un número en face 0, propiedad z (se encontró \"x\")",
+            ),
+            (
+                "a.pov:3:9 by the macro Wall: texture has no meaning for a sky",
+                "a.pov:3:9 en la macro Wall: texture no significa nada en un cielo",
+            ),
             ("warning: unknown directive \"x\" (5 more)", "aviso: directiva desconocida \"x\" (y 5 más)"),
             ("what nobody foresaw", "what nobody foresaw"),
         ] {
@@ -434,39 +536,255 @@ mod tests {
         }
     }
 
-    /// The lines that the catalogue of malformed scenes says of pbrt files.
+    /// The lines that the catalogues of malformed files say.
     fn catalogue() -> Vec<&'static str> {
-        let text = include_str!("../tests/malformed/pbrt.txt");
-        let lines: Vec<&str> = text.lines().collect();
-        lines.windows(2).filter(|pair| pair[0].starts_with("--- ")).map(|pair| pair[1]).collect()
+        let of_kinds = [
+            include_str!("../tests/malformed/pbrt.txt"),
+            include_str!("../tests/malformed/gltf.txt"),
+            include_str!("../tests/malformed/obj.txt"),
+            include_str!("../tests/malformed/ply.txt"),
+            include_str!("../tests/malformed/stl.txt"),
+        ];
+        let said = of_kinds.into_iter().flat_map(|text| {
+            let lines: Vec<&str> = text.lines().collect();
+            let pairs: Vec<[&str; 2]> = lines.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+            pairs.into_iter().filter(|[before, _]| before.starts_with("--- ")).map(|[_, line]| line)
+        });
+        said.collect()
+    }
+
+    /// The English words of a text outside of quotations, which come from a file.
+    fn english_words(text: &str) -> Vec<&str> {
+        const ENGLISH: &[&str] = &[
+            "the", "of", "is", "are", "wrong", "unknown", "expected", "found", "without", "has", "not",
+            "cannot", "before", "after", "more", "than", "numbers", "number", "or", "from", "to", "and",
+            "at", "with", "that", "which", "there", "an", "its", "less", "least", "most", "left", "out",
+            "missing", "file", "every", "used", "taken",
+        ];
+        // `from` and `to` are parameters of lights.
+        let is_of_light = text.contains("from y to");
+        let outside = text.split('"').step_by(2);
+        let words = outside.flat_map(|part| part.split(|c: char| !c.is_alphabetic() && c != '_' && c != '.'));
+        words.filter(|word| ENGLISH.contains(word) && !is_of_light).collect()
     }
 
     #[test]
-    fn what_the_catalogue_of_malformed_scenes_says_is_in_spanish() {
-        const ENGLISH: [&str; 22] = [
-            "the", "of", "is", "are", "wrong", "unknown", "expected", "found", "without", "has", "not",
-            "cannot", "before", "after", "more", "than", "numbers", "number", "or", "from", "to", "and",
-        ];
+    fn what_the_catalogues_of_malformed_files_say_is_in_spanish() {
         let all = catalogue();
-        assert!(all.len() > 140, "{}", all.len());
+        assert!(all.len() > 230, "{}", all.len());
         let mut wrong = Vec::new();
         for line in all {
             let spanish = in_spanish(line);
-            // What is quoted comes from the scene.
-            let outside: String = spanish.split('"').step_by(2).collect();
-            let words = outside.split(|c: char| !c.is_alphabetic());
-            // `from` and `to` are parameters of lights.
-            let is_of_light = spanish.contains("from y to");
-            let left: Vec<&str> = words.filter(|word| ENGLISH.contains(word) && !is_of_light).collect();
+            let left = english_words(&spanish);
             wrong.extend((!left.is_empty()).then(|| format!("{left:?} in {spanish}")));
         }
         assert!(wrong.is_empty(), "{wrong:#?}");
     }
 
+    /// The string literals of Rust source, without its tests.
+    fn literals(source: &str) -> Vec<String> {
+        let source = match source.rsplit_once("\n#[cfg(test)]\n") {
+            Some((code, tests)) if tests.contains("mod tests") => code,
+            _ => source,
+        };
+        let (mut all, mut rest) = (Vec::new(), source);
+        while let Some(at) = rest.find(['"', '\'', '/']) {
+            let (before, begin, after) = (&rest[..at], &rest[at..], &rest[at + 1..]);
+            rest = match begin.as_bytes()[0] {
+                b'/' if after.starts_with('/') => after.find('\n').map_or("", |end| &after[end..]),
+                b'\'' if after.starts_with("\"'") => &after[2..],
+                b'\'' if after.starts_with("\\\"'") => &after[3..],
+                b'"' => {
+                    let mut text = String::new();
+                    let mut characters = after.char_indices().peekable();
+                    let mut end = after.len();
+                    while let Some((at, c)) = characters.next() {
+                        match c {
+                            '"' => {
+                                end = at + 1;
+                                break;
+                            }
+                            '\\' => match characters.next() {
+                                // The literal goes on in the next line.
+                                Some((_, '\n')) => {
+                                    while characters.next_if(|(_, c)| c.is_whitespace()).is_some() {}
+                                }
+                                Some((_, 'n')) => text.push('\n'),
+                                Some((_, escaped)) => text.push(escaped),
+                                None => {}
+                            },
+                            c => text.push(c),
+                        }
+                    }
+                    // Why something cannot fail, and what lints say.
+                    let is_of_code = [".expect(", "reason = "].iter().any(|end| before.ends_with(end));
+                    all.extend((!is_of_code).then_some(text));
+                    &after[end..]
+                }
+                _ => after,
+            };
+        }
+        all
+    }
+
+    /// Literals of readers that are no sentences: pieces of sentences that the tables have whole, nouns of such
+    /// sentences, what only a picture that is written can meet, and words of formats.
+    const NOT_SAID: &[&str] = &[
+        "{made}; {ENDINGS} are read",
+        "of the unpacked grid {}",
+        "property list uchar int vertex_indices",
+        "cannot read",
+        "cannot open",
+        "cannot unpack",
+        "cannot write",
+        "cannot encode",
+        "did you mean {}?",
+        "{} {elements} announced, room for {most}",
+        "{what}: no face with an area has it",
+        "face with a {what} that does not exist",
+        "none, as there is no {what}",
+        "faces name {what}, and the file has none",
+        "Tr is opacity here",
+        "d is taken",
+        "by the macro {name}",
+        ": --integrator path has the light that surfaces give each other",
+        ": --integrator caustics has light that glass and mirrors gather",
+        "{word} is not rendered by the integrator pov{instead}",
+        "{lightless} cannot be an area light (that of {from}); is an AttributeEnd missing?",
+        "the tree's {what} are not in the grid",
+        "an accessor",
+        "an animation",
+        "a buffer view",
+        "an image",
+        "a light profile",
+        "{what} on a network: nothing is fetched from there",
+        "{what} behind a URI of a scheme that is not supported",
+        "{facet} has a vertex that is not finite",
+        "GIF images have from 1 to 65535 pixels a side",
+        "WebP images have at most 16384 pixels a side",
+        "JPEG images have at most 65535 pixels a side",
+        "no colours to write",
+        "channels R, G and B, or an .exr file",
+        "an image without pixels",
+        "{} is not written",
+        "unknown format to write",
+        "no channel can be named {}",
+        "a frame of another size",
+        "{option} has no effect: {} is not {kind}",
+        "a glTF file",
+        "the film",
+        "the {kind} camera",
+        "light area",
+        "is orthographic (expected --zoom)",
+        "sees all directions",
+        "has the lens of the scene",
+        " (but the system grants no more: see ulimit -v)",
+        " (but the control group has no more: see its memory.max)",
+        "raise it with --max-memory{}",
+        "{what}: needs {needed} bytes of memory, {left} are left; {raise}",
+        "Max address space",
+        "the camera",
+        "; did you mean {}?",
+        "; did you mean {near}?",
+        "a factor from 1e-6 to 1e6, such as 1.5",
+        "degrees from 0.001 to 179, such as 40",
+    ];
+
+    #[test]
+    fn every_sentence_of_a_reader_is_in_spanish() {
+        fn walk(folder: &std::path::Path, files: &mut Vec<std::path::PathBuf>) {
+            for entry in std::fs::read_dir(folder).expect("the folder of a crate") {
+                let path = entry.expect("a file").path();
+                if path.is_dir() {
+                    walk(&path, files);
+                } else {
+                    files.push(path);
+                }
+            }
+        }
+        let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let mut files = Vec::new();
+        walk(&crates.join("lumbre-formats/src"), &mut files);
+        walk(&crates.join("lumbre-scene/src"), &mut files);
+        for file in [
+            "lumbre/src/setting.rs",
+            "lumbre-cli/src/reading.rs",
+            "lumbre-cli/src/view.rs",
+            "lumbre-cli/src/memory.rs",
+        ] {
+            files.push(crates.join(file));
+        }
+        let mut count = 0;
+        let mut wrong = Vec::new();
+        for path in files {
+            let name = path.to_string_lossy().replace('\\', "/");
+            // Pages of the book, and tests.
+            if ["coverage.rs", "pages.rs", "tests.rs", "words.rs"].iter().any(|end| name.ends_with(end)) {
+                continue;
+            }
+            let source = std::fs::read_to_string(&path).expect("source is text");
+            // Errors of the scene's crate; all literals of a reader.
+            let of_reader = !name.contains("lumbre-scene");
+            let errors = || {
+                source
+                    .lines()
+                    .filter(|line| line.trim_start().starts_with("#[error("))
+                    .collect::<Vec<_>>()
+                    .join("\n")
+            };
+            let all = if of_reader { literals(&source) } else { literals(&errors()) };
+            for literal in all {
+                let is_sentence = literal
+                    .split(' ')
+                    .filter(|word| word.len() > 1 && word.chars().all(|c| c.is_ascii_lowercase()))
+                    .count()
+                    >= 2;
+                // What the readers of arguments expect has another table.
+                let is_of_argument = ["expected ", "found "].iter().any(|begin| literal.starts_with(begin));
+                if !is_sentence
+                    || is_of_argument
+                    || literal.contains('\n')
+                    || NOT_SAID.contains(&literal.as_str())
+                {
+                    continue;
+                }
+                count += 1;
+                // Numbers stand for what comes from a file.
+                let mut said = String::new();
+                for (i, piece) in literal.split('{').enumerate() {
+                    said.push_str(if i == 0 { piece } else { "7" });
+                    said.push_str(if i == 0 {
+                        ""
+                    } else {
+                        piece.split_once('}').map_or("", |(_, rest)| rest)
+                    });
+                }
+                // As a sentence, or as a part of one.
+                let is_translated = |spanish: &String| *spanish != said && english_words(spanish).is_empty();
+                let both = [in_spanish(&said), part_in_spanish(&said)];
+                if !both.iter().any(is_translated) {
+                    wrong.push(format!("{literal:?} of {name}: {both:?}"));
+                }
+            }
+        }
+        assert!(count > 700, "{count}");
+        assert!(wrong.is_empty(), "{} of {count}: {wrong:#?}", wrong.len());
+    }
+
     #[test]
     fn both_languages_have_the_same_places() {
-        for (english, spanish) in [SENTENCES, DETAILS].concat() {
-            assert_eq!(english.matches("{}").count(), spanish.matches("{}").count(), "{english}");
+        let tables = [SENTENCES, DETAILS, SCENES, MODELS, POV, FILES, COUNTED];
+        for (english, spanish) in tables.concat() {
+            let places = spanish.matches("{}").count() + spanish.matches("{=}").count();
+            assert_eq!(english.matches("{}").count(), places, "{english}");
+        }
+    }
+
+    #[test]
+    fn no_entry_is_there_twice() {
+        let mut seen = std::collections::BTreeSet::new();
+        for (english, _) in [SENTENCES, SCENES, MODELS, POV, FILES].concat() {
+            assert!(seen.insert(english), "{english}");
         }
     }
 }

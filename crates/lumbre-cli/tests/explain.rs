@@ -388,6 +388,38 @@ fn a_shape_that_is_missed_is_explained_and_by_how_much() {
 }
 
 #[test]
+fn a_line_in_a_surface_or_inside_of_it_is_not_said_to_miss_it() {
+    let desk = Desk::new();
+    let tube = r#"Shape "cylinder" "float radius" 1 "float zmin" -1 "float zmax" 1"#;
+    let cone = r#"Shape "cone" "float radius" 1 "float height" 2"#;
+    let disk = r#"Shape "disk" "float radius" 2"#;
+    let triangle = r#"Shape "trianglemesh" "point3 P" [0 0 0  1 0 0  0 1 0]"#;
+    let patch = r#"Shape "bilinearmesh" "point3 P" [0 0 0  4 0 0  0 4 0  4 4 0]"#;
+    let hyperboloid = r#"Shape "hyperboloid" "point3 p1" [1 0 -1] "point3 p2" [1 1 1]"#;
+    for (shape, ray, english, spanish) in [
+        (tube, "1,0,-5,0,0,1", "The ray lies in its surface", "El rayo está en su superficie"),
+        (tube, "0,0,-5,0,0,1", "The ray runs inside of it", "El rayo va por dentro de ella"),
+        (cone, "1,0,0,-1,0,2", "The ray lies in its surface", "El rayo está en su superficie"),
+        (disk, "0,-5,0,0,1,0", "The ray lies in its surface", "El rayo está en su superficie"),
+        (triangle, "-1,0.25,0,1,0,0", "The ray lies in its surface", "El rayo está en su superficie"),
+        (patch, "-1,0.25,0,1,0,0", "The ray lies in its surface", "El rayo está en su superficie"),
+        (hyperboloid, "1,0,-1,0,1,2", "The ray lies in its surface", "El rayo está en su superficie"),
+        (tube, "2,0,-5,0,0,1", "The ray misses it.", "El rayo no la corta."),
+        (disk, "3,-5,0,0,1,0", "The ray misses it.", "El rayo no la corta."),
+    ] {
+        desk.write("a.pbrt", &bare(shape, "", ""));
+        for (language, expected) in [("en", english), ("es", spanish)] {
+            let told = explained(&desk, &["--ray", ray, "--lang", language]);
+            let shape = &section(&told, "surfaces").unwrap()["sections"][0];
+            let said = all_texts(shape);
+            assert!(said.iter().any(|text| text.starts_with(expected)), "{ray}: {said:?}");
+            let misses = said.iter().any(|text| text.contains("misses"));
+            assert_eq!(misses, language == "en" && english.contains("misses"), "{ray}: {said:?}");
+        }
+    }
+}
+
+#[test]
 fn csg_intervals_cover_the_line_and_operands_have_names() {
     let desk = Desk::new();
     let shapes = r#"ObjectBegin "ball" Translate 0 0 -2 Shape "sphere" "float radius" 1.5 ObjectEnd

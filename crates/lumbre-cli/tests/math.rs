@@ -539,3 +539,38 @@ fn vectors_of_any_length_have_angles_and_parts() {
         assert!(!text.contains("inf") && !text.contains("NaN"), "{text}");
     }
 }
+
+/// The logarithm to base 2 of a number as `1.5·2^-9`.
+fn logarithm_of(written: &str) -> f64 {
+    let (share, power) = written.trim_matches(['(', ')']).split_once("·2^").unwrap();
+    share.parse::<f64>().unwrap().log2() + power.parse::<f64>().unwrap()
+}
+
+#[test]
+fn determinants_beyond_all_doubles_are_told_as_they_are() {
+    let desk = Desk::new();
+    let told = |expression: &str| stdout(&desk.lumbre(&["math", expression]));
+    let small = told("det([[1e-200, 0], [0, 3e-200]])");
+    assert!(small.contains("> 0: it keeps the hand") && small.contains("less than all doubles"), "{small}");
+    assert!(!small.contains("no inverse") && small.ends_with("= 0\n"), "{small}");
+    let written = small.lines().find_map(|line| line.strip_prefix("  m11 m22 - m12 m21 = ")).unwrap();
+    let (_, written) = written.split_once(" = ").unwrap();
+    let expected = 3.0_f64.log2() - 400.0 * 10.0_f64.log2();
+    assert!((logarithm_of(written) - expected).abs() < 1e-9, "{written}");
+    assert!(told("det([[1e-200, 2e-200], [2e-200, 4e-200]])").contains("= 0: no inverse"));
+    for (m, b) in
+        [("[[1e-200, 0], [0, 1e-200]]", "[1e-200, 2e-200]"), ("[[1e200, 0], [0, 1e200]]", "[1e200, 2e200]")]
+    {
+        let solved = told(&format!("solve({m}, {b})"));
+        assert!(solved.ends_with("= [1, 2]\n"), "{solved}");
+        assert!(!solved.contains("0 / 0") && !solved.contains("inf"), "{solved}");
+        let line =
+            solved.lines().find_map(|line| line.strip_prefix("  y = det[c1 b] / det[c1 c2] = ")).unwrap();
+        let (over, under) = line.split_once(" = ").unwrap().0.split_once(" / ").unwrap();
+        assert!((logarithm_of(over) - logarithm_of(under) - 1.0).abs() < 1e-9, "{line}");
+        let inverse = told(&format!("inverse({m})"));
+        assert!(inverse.contains("M' = M / 2^") && !inverse.contains("det M' = 0"), "{inverse}");
+    }
+    let spanish = stdout(&desk.lumbre(&["math", "--lang", "es", "det([[1e-200, 0], [0, 3e-200]])"]));
+    assert!(spanish.contains("no es 0, pero es menor"), "{spanish}");
+}

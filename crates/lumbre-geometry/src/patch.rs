@@ -482,7 +482,7 @@ impl Sheared {
         (1.0 - uv.y) * low + uv.y * high
     }
 
-    fn derivatives(&self, uv: DVec2) -> [DVec3; 2] {
+    pub(crate) fn derivatives(&self, uv: DVec2) -> [DVec3; 2] {
         let [p00, p10, p01, p11] = self.corners;
         [(1.0 - uv.y) * (p10 - p00) + uv.y * (p11 - p01), (1.0 - uv.x) * (p01 - p00) + uv.x * (p11 - p10)]
     }
@@ -531,6 +531,15 @@ impl Sheared {
             self.corners.iter().fold(0.0_f64, |most, corner| most.max(corner.x.abs().max(corner.y.abs())));
         let is_centred = |p: DVec3| p.x.abs().max(p.y.abs()) <= 1e-14 * size;
         size > 0.0 && is_centred(first) && is_centred(last)
+    }
+
+    /// Whether the ruling `u` is parallel to the ray, and does not lie on it: seen along the ray, it is a point elsewhere.
+    pub(crate) fn is_parallel_to_ruling(&self, u: f64) -> bool {
+        let [first, last] = [0.0, 1.0].map(|v| self.at(DVec2::new(u, v)));
+        let width = |p: DVec3| p.x.abs().max(p.y.abs());
+        let size = self.corners.iter().fold(0.0_f64, |most, corner| most.max(width(*corner)));
+        let slack = 1e-14 * (1.0 + u.abs()) * size;
+        width(last - first) <= slack && width(first) > slack
     }
 
     /// The point of a ruling that is nearest to the ray.

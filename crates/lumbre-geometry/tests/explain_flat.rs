@@ -6,7 +6,8 @@
 use std::collections::BTreeMap;
 
 use lumbre_geometry::{
-    BilinearPatch, Cuboid, Disk, Explanation, Fate, Plane, Ray, Remark, Shape, Step, Topic, Torus, Triangle,
+    BilinearPatch, Capsule, Cone, Cuboid, Cylinder, Disk, Explanation, Fate, Plane, Ray, Remark, Shape,
+    Sphere, Step, Topic, Torus, Triangle,
 };
 use lumbre_math::DVec3;
 use lumbre_math::random::RandomStream;
@@ -135,6 +136,8 @@ fn what_is_said_of_planes_and_disks_is_so() {
             said.hold("in the plane", made.contains(&Remark::InPlane), is_in, &context);
             let loses = made.iter().any(|remark| matches!(remark, Remark::Cancellation { .. }));
             said.hold("loses digits", loses, false, &context);
+            // All products of whole numbers are exact.
+            said.hold("twice the precision", made.contains(&Remark::TwicePrecision), false, &context);
             assert_eq!(explanation.candidates.len(), usize::from(slope != 0), "{}", context());
             for candidate in &explanation.candidates {
                 let t = Fraction::new(away, slope);
@@ -162,6 +165,45 @@ fn what_is_said_of_planes_and_disks_is_so() {
         }
     }
     said.has_each(&["parallel", "in the plane", "beyond the rim", "in the hole", "behind", "hit"]);
+}
+
+#[test]
+fn where_nothing_is_rounded_nothing_is_said_of_rounding() {
+    let shapes: [Shape; 5] = [
+        Cylinder::along_z(2.0, -3.0, 4.0, true).unwrap().into(),
+        Cylinder::along_z(2.0, -3.0, 4.0, false).unwrap().into(),
+        Capsule::new(DVec3::new(1.0, 0.0, -4.0), DVec3::new(1.0, 0.0, 4.0), 2.0).unwrap().into(),
+        Cone::new(DVec3::ZERO, DVec3::new(0.0, 0.0, 4.0), 2.0, 0.0, false).unwrap().into(),
+        Sphere::new(DVec3::new(1.0, 2.0, -1.0), 2.0).unwrap().into(),
+    ];
+    let mut count = 0;
+    for shape in &shapes {
+        // Along the axis: in the middle, in the side, beside it; along a generator of the cone; and across, touching.
+        for (origin, d) in [
+            ([0, 0, -8], [0, 0, 1]),
+            ([2, 0, -8], [0, 0, 1]),
+            ([0, 3, -8], [0, 0, 2]),
+            ([2, 0, 0], [-1, 0, 2]),
+            ([2, -8, 0], [0, 1, 0]),
+            ([3, -8, 0], [0, 1, 0]),
+            ([1, -8, -4], [0, 1, 0]),
+        ] {
+            let ray = ray_of(origin, d);
+            let explanation = shape.explain(&ray);
+            for remark in explanation.steps.iter().flat_map(|step| &step.remarks) {
+                let is_of_rounding = matches!(
+                    remark,
+                    Remark::TwicePrecision
+                        | Remark::Cancellation { .. }
+                        | Remark::SchoolbookHits
+                        | Remark::SchoolbookMisses
+                );
+                assert!(!is_of_rounding, "{ray:?} {explanation:#?}");
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 20, "{count}");
 }
 
 #[test]
@@ -309,6 +351,20 @@ fn what_is_said_of_patches_is_so() {
         let misses = delta < 0 || (a, b) == (0, 0) && c != 0;
         said.hold("no ruling", has(&Remark::Misses), misses, &context);
         said.hold("one ruling", has(&Remark::Touches), delta == 0 && a != 0, &context);
+        // E(u) = e + u·f runs along a ruling: parallel to d for one u, and not on the line.
+        let (e, f) = (sub(q01, q00), sub(sub(q11, q10), sub(q01, q00)));
+        let (k, l) = (cross(e, d), cross(f, d));
+        let parallel_at = (0..3).find(|&i| l[i] != 0).map(|i| Fraction::new(-k[i], l[i]));
+        let is_parallel = |u: Fraction| {
+            let start: Whole = std::array::from_fn(|i| u.1 * q00[i] + u.0 * (q10[i] - q00[i]));
+            (0..3).all(|i| k[i] * u.1 + u.0 * l[i] == 0) && cross(start, d) != [0, 0, 0]
+        };
+        let is_said = has(&Remark::ParallelRuling);
+        if let Some(u) = parallel_at {
+            said.hold("parallel ruling", is_said, is_parallel(u) && (a, b) != (0, 0), &context);
+        } else {
+            said.hold("parallel ruling", is_said && k != [0; 3], false, &context);
+        }
         let winding = remarks(&explanation, Topic::Winding);
         let sides = [(q00, q10), (q10, q11), (q11, q01), (q01, q00)].map(|(p, q)| turn(p, q));
         said.hold("on an edge", winding.contains(&Remark::OnEdge), sides.contains(&0), &context);
@@ -331,6 +387,7 @@ fn what_is_said_of_patches_is_so() {
         "every ruling",
         "no ruling",
         "one ruling",
+        "parallel ruling",
         "on an edge",
         "lies in it",
         "misses",

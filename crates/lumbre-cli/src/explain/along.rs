@@ -33,6 +33,25 @@ impl Along {
     }
 }
 
+/// What stands in the formula of a function, and in no step of the explanation.
+pub(super) fn definitions(formula: &str) -> &'static [&'static str] {
+    match formula {
+        OF_PATCH => {
+            &["O + t·D = P₀₀ + α·E₁ + β·E₂ + γ·E₃", "E₁ = P₁₀ − P₀₀", "E₂ = P₀₁ − P₀₀", "E₃ = P₁₁ − P₁₀ − E₂"]
+        }
+        OF_FLAT_PATCH => &["E₁ = P₁₀ − P₀₀", "E₂ = P₀₁ − P₀₀"],
+        OF_CAPSULE => &["P = O + t·D", "Q = P₁ + min(max((P − P₁)·V, 0), |P₂ − P₁|)·V"],
+        OF_TORUS => &["P = O + t·D"],
+        _ => &[],
+    }
+}
+
+const OF_PATCH: &str = "γ − α·β";
+const OF_FLAT_PATCH: &str = "(O + t·D − P₀₀)·(E₁×E₂)";
+/// `Q` is the nearest point of the segment between both ends.
+const OF_CAPSULE: &str = "|P − Q|² − r₁²";
+const OF_TORUS: &str = "(|P − C|² + R² − r²)² − 4·R²·|(P − C)×V|²";
+
 fn everywhere(start: f64, coefficients: impl Into<Vec<f64>>) -> Vec<Piece> {
     vec![Piece { from: f64::NEG_INFINITY, scale: 1.0, start, coefficients: coefficients.into() }]
 }
@@ -58,8 +77,8 @@ pub(super) fn along(shape: &Shape, explanation: &Explanation, ray: &Ray) -> Opti
         }
         Shape::Cuboid(_) => Along::Intervals(slabs(explanation, ray, factor)?),
         Shape::Csg(_) => Along::Intervals(of_operands(explanation)?),
-        Shape::Torus(torus) => function("(|P − C|² + R² − r²)² − 4·R²·|(P − C)×V|²", quartic(torus, ray)),
-        Shape::Capsule(capsule) => function("|P − Q|² − r₁²", by_parts(capsule, explanation, ray)?),
+        Shape::Torus(torus) => function(OF_TORUS, quartic(torus, ray)),
+        Shape::Capsule(capsule) => function(OF_CAPSULE, by_parts(capsule, explanation, ray)?),
         Shape::BilinearPatch(patch) => {
             let (formula, coefficients) = of_patch(patch, ray);
             function(formula, everywhere(0.0, coefficients))
@@ -211,12 +230,12 @@ fn of_patch(patch: &BilinearPatch, ray: &Ray) -> (&'static str, Vec<f64>) {
     let size = e1.length() * e2.length() * (e1.length() + e2.length() + e3.length());
     if det.abs() <= 1e-9 * size {
         let normal = e1.cross(e2);
-        return ("(O + t·D − P₀₀)·(E₁×E₂)", vec![normal.dot(place), normal.dot(ray.direction)]);
+        return (OF_FLAT_PATCH, vec![normal.dot(place), normal.dot(ray.direction)]);
     }
     // Each of the three is linear in t.
     let of = |row: DVec3| [row.dot(place) / det, row.dot(ray.direction) / det];
     let ([a0, a1], [b0, b1], [c0, c1]) = (of(e2.cross(e3)), of(e3.cross(e1)), of(e1.cross(e2)));
-    ("γ − α·β", vec![c0 - a0 * b0, c1 - a0 * b1 - a1 * b0, -a1 * b1])
+    (OF_PATCH, vec![c0 - a0 * b0, c1 - a0 * b1 - a1 * b0, -a1 * b1])
 }
 
 #[cfg(test)]
@@ -309,5 +328,42 @@ mod tests {
         let along = along(&shape, &shape.explain(&ray), &ray).expect("it has one");
         let Along::Function { formula, .. } = along else { panic!("{along:?}") };
         assert!(formula.starts_with("a·"), "{formula}");
+    }
+
+    #[test]
+    fn what_is_defined_beside_a_formula_gives_its_numbers() {
+        let (p00, p10, p01, p11) = (
+            DVec3::new(-2.0, -2.0, 0.0),
+            DVec3::new(2.0, -2.0, 1.0),
+            DVec3::new(-2.0, 2.0, 1.0),
+            DVec3::new(2.0, 3.0, -1.0),
+        );
+        let patch: Shape = BilinearPatch::new(p00, p10, p01, p11).expect("a patch").into();
+        let (p1, p2, r) = (DVec3::new(-1.0, 0.0, -1.0), DVec3::new(1.0, 0.5, 1.5), 0.7);
+        let capsule: Shape = Capsule::new(p1, p2, r).expect("a capsule").into();
+        let ray = Ray::new(DVec3::new(0.3, -4.0, 0.2), DVec3::new(0.1, 1.5, -0.05));
+        let of = |shape: &Shape, formula: &str| {
+            let along = along(shape, &shape.explain(&ray), &ray).expect("it has one");
+            assert!(matches!(&along, Along::Function { formula: found, .. } if *found == formula));
+            along
+        };
+        let (of_patch, of_capsule) = (of(&patch, OF_PATCH), of(&capsule, OF_CAPSULE));
+        for t in [-3.0, 0.0, 1.0, 2.2, 2.7, 3.1, 9.0] {
+            let p = ray.origin + t * ray.direction;
+            // α, β and γ by Cramer's rule.
+            let (e1, e2) = (p10 - p00, p01 - p00);
+            let e3 = p11 - p10 - e2;
+            let det = |a: DVec3, b: DVec3, c: DVec3| a.dot(b.cross(c));
+            let (w, all) = (p - p00, det(e1, e2, e3));
+            let (alpha, beta, gamma) = (det(w, e2, e3) / all, det(e1, w, e3) / all, det(e1, e2, w) / all);
+            let expected = gamma - alpha * beta;
+            let found = of_patch.at(t).expect("a number");
+            assert!((found - expected).abs() < 1e-11 * (1.0 + expected.abs()), "{t}: {found} {expected}");
+            let v = (p2 - p1).normalize();
+            let q = p1 + (p - p1).dot(v).max(0.0).min((p2 - p1).length()) * v;
+            let expected = (p - q).length_squared() - r * r;
+            let found = of_capsule.at(t).expect("a number");
+            assert!((found - expected).abs() < 1e-11 * (1.0 + expected.abs()), "{t}: {found} {expected}");
+        }
     }
 }

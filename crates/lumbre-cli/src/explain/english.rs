@@ -174,10 +174,13 @@ pub(super) static ENGLISH: Texts = Texts {
     show_all: "Show all",
     step_of: "Step {0} of {1}: {2}",
     is_missed: "The ray misses it.",
+    lies_in_it: "The ray lies in its surface, as at t = {0}, and does not cross it.",
+    meets_it: "The ray meets it, as at t = {0}, and does not cross it.",
+    runs_inside: "The ray runs inside of it, and does not cross it.",
     passes: "It passes it at a distance of {0}, nearest at t = {1}.",
     passes_in_object: "In the object's own space it passes it at a distance of {0}, nearest at t = {1}.",
-    missed: "Shapes that the ray misses:",
-    missed_nearest: "The shapes that it passes nearest, and why it misses them:",
+    missed: "Shapes that the ray does not cross:",
+    missed_nearest: "The shapes that it passes nearest, and why it does not cross them:",
     no_such_shape: "--shape {0}: no shape has this number, kind or material (expected a number, or one of {1})",
     no_such_key: "--only {0}: no section has this key (expected some of {1})",
     no_sections: "There is no such section for this ray.",
@@ -307,6 +310,7 @@ fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
         Remark::EveryRuling => {
             "a = h = c = 0: every ruling of this family meets the line, which is one of the other family."
         }
+        Remark::ParallelRuling => "A ruling is parallel to the ray: they meet nowhere.",
         Remark::SchoolbookCount { crossings, roots } => {
             return format!(
                 "The rounded coefficients have another number of roots, {roots}, than there are crossings: {crossings}."
@@ -494,12 +498,24 @@ fn symbol(topic: Topic, symbol: &str, kind: &str) -> &'static str {
         (Topic::Shear, "i₃", _) => "coordinate axis, the one that the direction is longest along",
         (Topic::Winding, "σ", _) => "sign of each",
         (Topic::Winding, "n", _) => "how often the outline winds about the ray",
+        (Topic::Rulings, "w₁" | "w₂", _) => "u of a ruling that meets the ray",
+        (Topic::Roots, "x₄" | "y₄" | "x₇" | "y₇", "bilinear") => {
+            "where this ruling starts, as seen along the ray"
+        }
+        (Topic::Roots, "x₅" | "y₅" | "x₈" | "y₈", "bilinear") => "where it ends",
+        (Topic::Roots, "v′₁" | "v′₂", "bilinear") => "v of its point nearest to the ray",
+        (Topic::Roots, "x₆" | "y₆" | "x₉" | "y₉", "bilinear") => "how far that point is off the ray",
+        (Topic::Roots, "g₁" | "g₂" | "g₃" | "g₄", "bilinear") => "derivative along u",
+        (Topic::Roots, "A₁" | "A₂", "bilinear") => "area of the derivatives along u and along v",
         (Topic::Roots, "u₁" | "u₂" | "v₁" | "v₂", "bilinear") => {
             "place on the patch, after a step of Newton's method"
         }
         (Topic::Roots, "t₁" | "t₂", "bilinear") => "t there",
-        (Topic::Span, "t₁", "capsule") => "where the line enters",
-        (Topic::Span, "t₂", "capsule") => "where it leaves",
+        (Topic::Span, "I₀", "capsule") => "within the side, between both planes",
+        (Topic::Span, "I₁", "capsule") => "within the ball about the first end",
+        (Topic::Span, "I₂", "capsule") => "within the ball about the second end",
+        (Topic::Span, "t₁", "capsule") => "where the line enters: the first of all ends",
+        (Topic::Span, "t₂", "capsule") => "where it leaves: the last of all ends",
         (Topic::Intervals, "I", _) => "within the result",
         (Topic::Intervals, _, _) => "within the operand of this number",
         (Topic::Surface, "P", _) => "the point",

@@ -7,6 +7,7 @@ use lumbre::geometry::{Explanation, Fate, Shape, Topic, Value as Found};
 use lumbre::{DVec3, Ray, Transform};
 
 use super::along::{along, number, vector};
+use super::formula::with_primes;
 use super::misses::Nearest;
 use super::numbers::label;
 use super::plot::{Plot, plot};
@@ -154,7 +155,12 @@ impl Subject<'_> {
         let along = along(self.shape, self.explanation, self.object_ray);
         let plot = along.map(|along| {
             let title = if along.at(0.0).is_some() { texts.plot } else { texts.plot_of_intervals };
-            plot(&along, &crossings, nearest, title)
+            let mut plot = plot(&along, &crossings, nearest, title);
+            if self.is_placed {
+                let of_ray = |text: &mut String| *text = with_primes(text, &["O", "D", "P"]);
+                plot.formula.iter_mut().chain(&mut plot.definitions).for_each(of_ray);
+            }
+            plot
         });
         let places: Vec<(Name, f64)> = crossings.iter().map(|it| (it.name.clone(), it.t)).collect();
         let prime = if self.is_placed { "′" } else { "" };

@@ -176,8 +176,7 @@ impl Page {
         }
         if let Some(plot) = plot {
             let title = if plot.formula.is_some() { texts.plot } else { texts.plot_of_intervals };
-            let formula =
-                plot.formula.map(|formula| format!(": {}", self.formula(&format!("F(t) = {formula}"))));
+            let formula = plot.formula.as_ref().map(|formula| format!(": {}", self.formula(formula)));
             let pieces: Vec<String> = plot.pieces.iter().map(|piece| numbers(piece)).collect();
             let _ = writeln!(
                 self.out,
@@ -209,7 +208,12 @@ impl Page {
         } else {
             self.out.push_str("</div>\n");
         }
-        let _ = writeln!(self.out, "<figcaption>{}</figcaption>\n</figure>", escaped(texts.sketch));
+        let definitions: Vec<String> =
+            plot.iter().flat_map(|plot| &plot.definitions).map(|text| self.formula(text)).collect();
+        let definitions =
+            if definitions.is_empty() { String::new() } else { format!("<br>{}", definitions.join(", ")) };
+        let _ =
+            writeln!(self.out, "<figcaption>{}{definitions}</figcaption>\n</figure>", escaped(texts.sketch));
     }
 }
 

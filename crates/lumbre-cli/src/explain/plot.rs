@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use lumbre::DVec2;
 
-use super::along::Along;
+use super::along::{Along, definitions};
 use super::formula::escaped;
 use super::labels::{FONT_SIZE, Labels, Rect};
 use super::numbers::{exact, short};
@@ -28,8 +28,9 @@ pub(super) struct Plot {
     pub(super) svg: String,
     /// The first and the last `t`.
     pub(super) range: [f64; 2],
-    /// The formula of `F`, where it has one.
-    pub(super) formula: Option<&'static str>,
+    /// The formula of `F`, where it has one, and those of what stands in it alone.
+    pub(super) formula: Option<String>,
+    pub(super) definitions: Vec<String>,
     /// The pieces of the function: from where on, the scale and the start of its variable, and the coefficients, the constant first.
     pub(super) pieces: Vec<Vec<f64>>,
 }
@@ -86,11 +87,13 @@ pub(super) fn plot(along: &Along, crossings: &[Crossing], nearest: Option<f64>, 
                     .chain(piece.coefficients.iter().copied())
                     .collect()
             });
-            Plot { svg: out, range: [from, to], formula: Some(formula), pieces: pieces.collect() }
+            let definitions = definitions(formula).iter().map(|text| (*text).to_owned()).collect();
+            let formula = Some(format!("F(t) = {formula}"));
+            Plot { svg: out, range: [from, to], formula, definitions, pieces: pieces.collect() }
         }
         Along::Intervals(rows) => {
             intervals(&mut out, rows, crossings, [from, to], &across);
-            Plot { svg: out, range: [from, to], formula: None, pieces: Vec::new() }
+            Plot { svg: out, range: [from, to], formula: None, definitions: Vec::new(), pieces: Vec::new() }
         }
     }
 }

@@ -174,6 +174,9 @@ pub(super) static SPANISH: Texts = Texts {
     show_all: "Mostrar todo",
     step_of: "Paso {0} de {1}: {2}",
     is_missed: "El rayo no la corta.",
+    lies_in_it: "El rayo está en su superficie, como en t = {0}, y no la corta.",
+    meets_it: "El rayo la toca, como en t = {0}, y no la corta.",
+    runs_inside: "El rayo va por dentro de ella y no la corta.",
     passes: "Pasa a una distancia de {0}; el punto más cercano está en t = {1}.",
     passes_in_object: "En el espacio del objeto pasa a una distancia de {0}; el punto más cercano está en t = {1}.",
     missed: "Formas que el rayo no corta:",
@@ -306,6 +309,7 @@ fn remark(remark: &Remark, name: &OperandName<'_>) -> String {
         Remark::EveryRuling => {
             "a = h = c = 0: todas las generatrices de esta familia cortan la recta, que es una de la otra familia."
         }
+        Remark::ParallelRuling => "Una generatriz es paralela al rayo: no se cortan.",
         Remark::SchoolbookCount { crossings, roots } => {
             return format!(
                 "Los coeficientes redondeados tienen otro número de raíces, {roots}, que intersecciones hay: {crossings}."
@@ -579,12 +583,26 @@ fn symbol(topic: Topic, symbol: &str, kind: &str) -> &'static str {
         (Topic::Shear, "i₃", _) => "eje de coordenadas, aquel en que la dirección es más larga",
         (Topic::Winding, "σ", _) => "signo de cada una",
         (Topic::Winding, "n", _) => "cuántas vueltas da el contorno alrededor del rayo",
+        (Topic::Rulings, "w₁" | "w₂", _) => "u de una generatriz que corta el rayo",
+        (Topic::Roots, "x₄" | "y₄" | "x₇" | "y₇", "bilinear") => {
+            "dónde empieza esta generatriz, vista a lo largo del rayo"
+        }
+        (Topic::Roots, "x₅" | "y₅" | "x₈" | "y₈", "bilinear") => "dónde acaba",
+        (Topic::Roots, "v′₁" | "v′₂", "bilinear") => "v de su punto más cercano al rayo",
+        (Topic::Roots, "x₆" | "y₆" | "x₉" | "y₉", "bilinear") => {
+            "cuánto se aparta ese punto del rayo"
+        }
+        (Topic::Roots, "g₁" | "g₂" | "g₃" | "g₄", "bilinear") => "derivada según u",
+        (Topic::Roots, "A₁" | "A₂", "bilinear") => "área de las derivadas según u y según v",
         (Topic::Roots, "u₁" | "u₂" | "v₁" | "v₂", "bilinear") => {
             "lugar en el parche, tras un paso del método de Newton"
         }
         (Topic::Roots, "t₁" | "t₂", "bilinear") => "t en ese lugar",
-        (Topic::Span, "t₁", "capsule") => "dónde entra la recta",
-        (Topic::Span, "t₂", "capsule") => "dónde sale",
+        (Topic::Span, "I₀", "capsule") => "dentro del costado, entre ambos planos",
+        (Topic::Span, "I₁", "capsule") => "dentro de la bola en el primer extremo",
+        (Topic::Span, "I₂", "capsule") => "dentro de la bola en el segundo extremo",
+        (Topic::Span, "t₁", "capsule") => "dónde entra la recta: el primero de todos los extremos",
+        (Topic::Span, "t₂", "capsule") => "dónde sale: el último de todos los extremos",
         (Topic::Intervals, "I", _) => "dentro del resultado",
         (Topic::Intervals, _, _) => "dentro del operando de este número",
         (Topic::Surface, "P", _) => "el punto",

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use lumbre::description::Footprint;
-use lumbre::geometry::{Curves, Shape, Surface, Triangle};
+use lumbre::geometry::{Curves, Remark, Shape, Surface, Triangle};
 use lumbre::kernel::{Hit, Target, TargetShape};
 use lumbre::math::Elementary;
 use lumbre::math::glam::{DMat3, DMat4};
@@ -142,6 +142,26 @@ struct Thing<'a> {
     nearest: Option<Nearest>,
 }
 
+/// That a ray misses a shape, and by how much; or that it lies in the surface, touches it or runs inside of it.
+fn why_no_hit(object: &Object, nearest: Option<Nearest>, texts: &Texts) -> Vec<String> {
+    let explanation = object.shape.as_ref().map(|shape| shape.explain(&object.ray));
+    let has = |wanted: &[Remark]| {
+        let steps = explanation.iter().flat_map(|explanation| &explanation.steps);
+        steps.flat_map(|step| &step.remarks).any(|remark| wanted.contains(remark))
+    };
+    if has(&[Remark::InsideThroughout]) {
+        return vec![texts.runs_inside.to_owned()];
+    }
+    let Some(Nearest { distance, t, in_object }) = nearest else { return vec![texts.is_missed.to_owned()] };
+    let (place, shown) = (object.ray.at(t), Value::from(t).in_short());
+    if distance > 1e-14 * (1.0 + place.abs().max_element()) {
+        let text = if in_object { texts.passes_in_object } else { texts.passes };
+        return vec![texts.is_missed.to_owned(), filled(text, &[&exact(distance), &shown])];
+    }
+    let lies = [Remark::InSurface, Remark::InPlane, Remark::EdgeOn, Remark::EveryRuling, Remark::AlongRuling];
+    vec![filled(if has(&lies) { texts.lies_in_it } else { texts.meets_it }, &[&shown])]
+}
+
 fn tell(
     scene: &Scene,
     ray: &Ray,
@@ -164,19 +184,7 @@ fn tell(
     let title = filled(texts.shape, &[&index.to_string(), &kind]);
     let mut section = Section::new(format!("shape {index}"), title);
     section.fact(texts.material, material_of(things, index, texts));
-    if hits.is_empty() {
-        section.text(texts.is_missed);
-        if let Some(Nearest { distance, t, in_object }) = nearest {
-            let text = if in_object { texts.passes_in_object } else { texts.passes };
-            section.text(filled(text, &[&exact(distance), &Value::from(t).in_short()]));
-        }
-    }
-    if let Some(&instance) = hit.instances.first() {
-        section.fact(texts.instance, f64::from(instance));
-    }
-    if matches!(shape, TargetShape::Triangle(_)) {
-        section.fact(texts.triangle, f64::from(resolved.primitive_index(hit)));
-    }
+    let is_triangle = matches!(shape, TargetShape::Triangle(_));
     // The same steps as the search takes, for the same bits.
     let inner = placements.iter().fold(*ray, |ray, map| ray.into_object(map));
     let (shape, own, object_ray) = match &shape {
@@ -194,6 +202,17 @@ fn tell(
     let chain: Vec<Transform> = placements.into_iter().chain(own).collect();
     let whole = chain.iter().copied().fold(Transform::IDENTITY, |outer, inner| outer * inner);
     let object = Object { ray: object_ray, shape, chain, whole };
+    if hits.is_empty() {
+        for text in why_no_hit(&object, nearest, texts) {
+            section.text(text);
+        }
+    }
+    if let Some(&instance) = hit.instances.first() {
+        section.fact(texts.instance, f64::from(instance));
+    }
+    if is_triangle {
+        section.fact(texts.triangle, f64::from(resolved.primitive_index(hit)));
+    }
     if object.is_placed() {
         section.sections.push(transforms(&object, ray, &mut scope, texts));
     } else {

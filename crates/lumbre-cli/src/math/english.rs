@@ -90,6 +90,7 @@ pub(super) static ENGLISH: Texts = Texts {
     cramer: "Cramer's rule: the columns of M are",
     mirrors: "< 0: it mirrors",
     flattens: "= 0: no inverse",
+    less_than_all: "not 0, but less than all doubles: the result is rounded to 0, and there is an inverse",
     keeps_hand: "> 0: it keeps the hand",
     looks_along_minus_z: "right-handed: the camera looks along -z",
     looks_along_z: "left-handed: the camera looks along +z",

@@ -74,6 +74,45 @@ pub(super) fn determinant(m: &Matrix) -> f64 {
     of_size!(m, rows => exact::determinant(&rows))
 }
 
+fn is_singular(m: &Matrix) -> bool {
+    of_size!(m, rows => exact::is_singular(&rows))
+}
+
+/// The exponent of the power of two that is the largest of these numbers or less; 0 where all are 0.
+fn exponent(numbers: &[f64]) -> i32 {
+    let most = numbers.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    // A subnormal number has fewer digits than 53.
+    let (most, less) = if most < f64::MIN_POSITIVE { (most * 2.0_f64.powi(60), 60) } else { (most, 0) };
+    let field = ((most.to_bits() >> 52) & 0x7FF) as i32;
+    if most == 0.0 { 0 } else { field - 1023 - less }
+}
+
+/// `x · 2^n`, without a power that is no number.
+fn times_power(x: f64, n: i32) -> f64 {
+    let half = n / 2;
+    x * 2.0_f64.powi(half) * 2.0_f64.powi(n - half)
+}
+
+/// The matrix with each row divided by a power of two, so that its largest entry is from 1 to 2; and the exponent of
+/// the product of these powers.
+fn with_rows_near_one(m: &Matrix) -> (Matrix, i32) {
+    let exponents: Vec<i32> = m.cells[..m.rows].iter().map(|row| exponent(&row[..m.columns])).collect();
+    let scaled = Matrix::from_fn(m.rows, m.columns, |i, j| times_power(m.cells[i][j], -exponents[i]));
+    (scaled, exponents.iter().sum())
+}
+
+/// The determinant as it is written: one that is no double for its size, as a number times a power of two.
+fn written_determinant(m: &Matrix) -> String {
+    let whole = determinant(m);
+    let is_in_range = whole.is_finite() && whole.abs() >= f64::MIN_POSITIVE;
+    if is_in_range || is_singular(m) {
+        return number(whole);
+    }
+    let (scaled, power) = with_rows_near_one(m);
+    let share = determinant(&scaled);
+    if share.is_normal() { format!("{}·2^{power}", number(share)) } else { number(whole) }
+}
+
 /// What is left without a row and a column.
 fn without(m: &Matrix, row: usize, column: usize) -> Matrix {
     let after = |i: usize, left: usize| if i < left { i } else { i + 1 };
@@ -86,9 +125,10 @@ fn of_two(m: &Matrix) -> String {
 }
 
 /// That the matrix is so nearly singular that the rounding of its entries decides; `None` where it is not.
-fn nearly_singular(m: &Matrix, determinant: f64, work: &Work) -> Option<String> {
-    let mut share = determinant.abs();
-    for row in &m.cells[..m.rows] {
+fn nearly_singular(m: &Matrix, work: &Work) -> Option<String> {
+    let (scaled, _) = with_rows_near_one(m);
+    let mut share = determinant(&scaled).abs();
+    for row in &scaled.cells[..scaled.rows] {
         let length = vector::length([row[0], row[1], row[2]].into()).hypotenuse(row[3]);
         share /= length;
     }
@@ -104,7 +144,7 @@ fn two_digits(x: f64) -> f64 {
 fn det(call: &mut Call) -> Result<Value, Wrong> {
     let m = square(call, 0)?;
     let result = determinant(&m);
-    let written = number(result);
+    let written = written_determinant(&m);
     let first = &m.cells[0];
     let minors: Vec<Matrix> = (0..m.columns).map(|j| without(&m, 0, j)).collect();
     let texts = call.work.texts;
@@ -115,7 +155,12 @@ fn det(call: &mut Call) -> Result<Value, Wrong> {
         });
         terms.collect::<String>()
     };
-    let by_minors = || sum(&|j| format!("·{}", factor(determinant(&minors[j]))));
+    let by_minors = || {
+        sum(&|j| {
+            let minor = written_determinant(&minors[j]);
+            if minor.starts_with('-') { format!("·({minor})") } else { format!("·{minor}") }
+        })
+    };
     match m.rows {
         1 => call.work.line(format!("m11 = {written}")),
         2 => call.work.line(format!("m11 m22 - m12 m21 = {} = {written}", of_two(&m))),
@@ -128,7 +173,7 @@ fn det(call: &mut Call) -> Result<Value, Wrong> {
             call.work.line(texts.minors);
             for (j, minor) in minors.iter().enumerate() {
                 let name = format!("M1{} =", j + 1);
-                let value = format!("= {}", number(determinant(minor)));
+                let value = format!("= {}", written_determinant(minor));
                 call.work.beside(&[name.into(), "det".into(), minor.into(), value.into()]);
             }
             call.work.line("m11 M11 - m12 M12 + m13 M13 - m14 M14");
@@ -138,14 +183,18 @@ fn det(call: &mut Call) -> Result<Value, Wrong> {
     if m.rows > 1 {
         call.work.line(texts.exact_sum);
     }
-    call.work.line(if result < 0.0 {
-        texts.mirrors
-    } else if result == 0.0 {
+    // By the sign that is written, for a determinant may be less than all doubles.
+    call.work.line(if is_singular(&m) {
         texts.flattens
+    } else if written.starts_with('-') {
+        texts.mirrors
     } else {
         texts.keeps_hand
     });
-    if let Some(line) = nearly_singular(&m, result, call.work) {
+    if result == 0.0 && !is_singular(&m) {
+        call.work.line(texts.less_than_all);
+    }
+    if let Some(line) = nearly_singular(&m, call.work) {
         call.work.line(line);
     }
     Ok(Value::Number(result))
@@ -161,27 +210,34 @@ pub(super) fn inverted(m: &Matrix) -> Option<Matrix> {
 
 /// How the inverse comes from the cofactors.
 pub(super) fn show_inverse(m: &Matrix, inverse: &Matrix, work: &mut Work) {
-    let whole = determinant(m);
-    let cofactors = of_size!(m, rows => {
+    // Products of so many entries are doubles.
+    let power = exponent(m.cells[..m.rows].as_flattened());
+    let power = if power.abs() > 200 { power } else { 0 };
+    let scaled = Matrix::from_fn(m.rows, m.columns, |i, j| times_power(m.cells[i][j], -power));
+    let name = if power == 0 { "M" } else { "M'" };
+    if power != 0 && m.rows > 1 {
+        work.line(format!("M' = M / 2^{power},  M⁻¹ = M'⁻¹ / 2^{power}"));
+    }
+    let cofactors = of_size!(&scaled, rows => {
         let all = exact::cofactors(&rows).unwrap_or(rows);
         Matrix::from_fn(m.rows, m.columns, |i, j| all[i][j])
     });
     if m.rows > 1 {
-        work.line(work.texts.by_cofactors);
+        work.line(work.texts.by_cofactors.replace('M', name));
     }
     if m.rows == 3 {
         for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
             let sign = if (i + j) % 2 == 0 { "" } else { "-" };
-            let products = of_two(&without(m, i, j));
+            let products = of_two(&without(&scaled, i, j));
             let value = number(cofactors.cells[i][j]);
             work.line(format!("C{}{} = {sign}({products}) = {value}", i + 1, j + 1));
         }
     }
     if m.rows > 1 {
-        let end = format!("  det M = {}", number(whole));
+        let end = format!("  det {name} = {}", written_determinant(&scaled));
         work.beside(&["C =".into(), (&cofactors).into(), end.into()]);
     }
-    if let Some(line) = nearly_singular(m, whole, work) {
+    if let Some(line) = nearly_singular(m, work) {
         work.line(line);
     }
     show_unit_product(m, inverse, work);
@@ -204,32 +260,34 @@ fn solve(call: &mut Call) -> Result<Value, Wrong> {
     };
     let texts = call.work.texts;
     let refused = |call: &Call, message: &str| {
-        let found = format!("det M = {}", number(determinant(&m)));
+        let found = format!("det M = {}", written_determinant(&m));
         let what = Diagnostic::error(message).found(found).expected(texts.independent);
         Wrong::new(call.offset(), what)
     };
-    let (x, parts): (Vec<f64>, Vec<f64>) = of_size!(&m, rows => {
+    let x: Vec<f64> = of_size!(&m, rows => {
         let right = std::array::from_fn(|i| b[i]);
         match exact::solve(&rows, &right) {
-            Solutions::One(x) => (x.to_vec(), exact::numerators(&rows, &right).unwrap_or(x).to_vec()),
+            Solutions::One(x) => x.to_vec(),
             Solutions::None => return Err(refused(call, texts.no_solution)),
             Solutions::Many => return Err(refused(call, texts.many_solutions)),
             Solutions::NotFinite => return Err(refused(call, texts.not_finite)),
         }
     });
     let columns: Vec<String> = (1..=m.rows).map(|j| format!("c{j}")).collect();
-    let whole = determinant(&m);
+    let whole = written_determinant(&m);
     call.work.line(format!("{} {}", texts.cramer, columns.join(", ")));
     let all = columns.join(" ");
-    call.work.line(format!("det[{all}] = {}", number(whole)));
-    for (i, (part, x)) in parts.iter().zip(&x).enumerate() {
+    call.work.line(format!("det[{all}] = {whole}"));
+    let whole = if whole.starts_with('-') || whole.contains('·') { format!("({whole})") } else { whole };
+    for (i, x) in x.iter().enumerate() {
+        let part = Matrix::from_fn(m.rows, m.columns, |row, j| if i == j { b[row] } else { m.cells[row][j] });
         let mut replaced = columns.clone();
         replaced[i] = "b".to_owned();
         let (replaced, name) = (replaced.join(" "), ["x", "y", "z", "w"][i]);
-        let quotient = format!("{} / {}", number(*part), factor(whole));
+        let quotient = format!("{} / {whole}", written_determinant(&part));
         call.work.line(format!("{name} = det[{replaced}] / det[{all}] = {quotient} = {}", number(*x)));
     }
-    if let Some(line) = nearly_singular(&m, whole, call.work) {
+    if let Some(line) = nearly_singular(&m, call.work) {
         call.work.line(line);
     }
     Ok(Value::Vector(x))

@@ -90,6 +90,7 @@ pub(super) static SPANISH: Texts = Texts {
     cramer: "regla de Cramer: las columnas de M son",
     mirrors: "< 0: refleja",
     flattens: "= 0: no tiene inversa",
+    less_than_all: "no es 0, pero es menor que todos los números de doble precisión: el resultado se redondea a 0, y hay inversa",
     keeps_hand: "> 0: conserva el sentido de los ejes",
     looks_along_minus_z: "ejes a derechas: la cámara mira hacia -z",
     looks_along_z: "ejes a izquierdas: la cámara mira hacia +z",

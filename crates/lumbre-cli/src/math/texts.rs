@@ -94,6 +94,7 @@ pub(super) struct Texts {
     pub(super) cramer: &'static str,
     pub(super) mirrors: &'static str,
     pub(super) flattens: &'static str,
+    pub(super) less_than_all: &'static str,
     pub(super) keeps_hand: &'static str,
     pub(super) looks_along_minus_z: &'static str,
     pub(super) looks_along_z: &'static str,

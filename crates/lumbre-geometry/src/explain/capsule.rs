@@ -16,16 +16,21 @@ impl Capsule {
         };
         tube.tell_cuts(ray, notes);
         let mut found = side.to_vec();
+        let mut parts = vec![("I₀", self.within_cylinder(ray).into_iter().collect())];
         for part in self.balls(ray) {
             let topic = if part == CAP1 { Topic::FirstBall } else { Topic::SecondBall };
             let (center, radius) = (self.cap(part).0, self.radius());
             notes.step(topic).vector("C", "", center).number("r", "", radius);
             if let Some((near, far)) = tell_sphere(notes, center, radius, ray) {
                 found.extend([(near, part), (far, part)]);
+                parts.push((if part == CAP1 { "I₁" } else { "I₂" }, vec![[near, far]]));
             }
         }
         let span = self.span(ray);
         let step = notes.step(Topic::Span);
+        for (name, within) in parts {
+            step.intervals(name, within);
+        }
         match span {
             Some([near, far]) => {
                 step.number("t₁", "", near.0).number("t₂", "", far.0);
@@ -55,6 +60,14 @@ impl Capsule {
             };
             notes.candidate(t, part, fate);
         }
+    }
+
+    /// The interval of the line within the side and between the planes of both ends.
+    fn within_cylinder(&self, ray: &Ray) -> Option<[f64; 2]> {
+        let [side_near, side_far] = self.tube.lateral_span(ray)?;
+        let [slab_near, slab_far] = self.tube.slab_span(ray)?;
+        let (near, far) = (side_near.0.max(slab_near.0), side_far.0.min(slab_far.0));
+        (near <= far).then_some([near, far])
     }
 
     /// The ends whose balls the search asks: those beyond which the line passes within the side's cylinder.

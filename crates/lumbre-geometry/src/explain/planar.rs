@@ -27,9 +27,11 @@ pub(super) fn tell_plane(
     if is_exact {
         (away, _) = exact_plane_products(ray, point, normal);
     }
+    // Where nothing is rounded, twice the precision changes nothing.
+    let is_rounded = is_exact && (rough_along, rough_away) != (along, away);
     step.number("μ", format!("D·{normal_name}"), along);
     step.number("δ", format!("({point_name} − O)·{normal_name}"), away);
-    if is_exact {
+    if is_rounded {
         step.remark(Remark::TwicePrecision);
     }
     if along == 0.0 {
@@ -37,7 +39,7 @@ pub(super) fn tell_plane(
         return None;
     }
     step.number("t", "δ/μ", t);
-    if is_exact {
+    if is_rounded {
         let schoolbook = rough_away / rough_along;
         step.beside(format!("(({point_name} − O)·{normal_name})/(D·{normal_name})"), schoolbook);
         let off = ((schoolbook - t) / t).abs();

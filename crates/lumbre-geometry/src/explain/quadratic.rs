@@ -91,7 +91,8 @@ impl Solved {
             delta_error: None,
             errors: None,
             q: exact.q().high,
-            is_twofold: true,
+            // Where nothing is rounded, twice the precision changes nothing.
+            is_twofold: [exact.a, exact.h, exact.c, exact.delta()].iter().any(|number| number.low != 0.0),
             ..self
         }
     }

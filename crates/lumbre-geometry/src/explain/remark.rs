@@ -63,6 +63,8 @@ pub enum Remark {
     AlongRuling,
     /// Every ruling of one family meets the line: it is a ruling of the other family.
     EveryRuling,
+    /// A ruling of a bilinear patch is parallel to the line: they meet nowhere.
+    ParallelRuling,
     /// The line is parallel to a plane, and lies in it.
     InPlane,
     /// Products rounded to the same number, so that their rounding errors decided about an edge.

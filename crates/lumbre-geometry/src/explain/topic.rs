@@ -23,7 +23,9 @@ pub enum Topic {
     /// where the search asks whether doubles decide the sign.
     Discriminant,
     /// The roots of the equation, and the crossings `t₁ ≤ t₂` of the whole line. Of a bilinear patch, the places `u`
-    /// and `v` of each crossing with the patch too, after a step of Newton's method.
+    /// and `v` of each crossing with the patch too: with the ruling's ends as seen along the ray, `x₄`, `y₄` and `x₅`,
+    /// `y₅` (or `x₇`, `y₇` and `x₈`, `y₈`), the place `v′` on it that is nearest to the ray; from there, a step of
+    /// Newton's method with the derivative `g` along u and the area `A` of both derivatives.
     Roots,
     /// A cone's radius `ρ`, with a sign, in the middle of both roots, which says which of them are on the nappe of the
     /// body. (Along the line, the radius grows by `g` for each unit of `t`.)
@@ -43,6 +45,8 @@ pub enum Topic {
     /// Where the line passes the planes of a box, axis by axis: those of the lower and higher coordinate.
     Slabs,
     /// The interval of the line within a convex solid: from the last of what it enters to the first of what it leaves.
+    /// Of a capsule, the interval that covers those of its parts: `I₀` within the cylinder between both planes, `I₁` and
+    /// `I₂` within the balls.
     Span,
     /// The line in a torus' own frame, from the point that is nearest to the centre: `p + s·U`, with a unit `U`. `g` is
     /// the length of the direction, and `s₀` what rounding leaves between `t₀` and that point. `z₀` and `z₁` are the
@@ -74,8 +78,8 @@ pub enum Topic {
     /// How often a bilinear patch's outline winds about the ray, from the side of each edge that it passes on (1 where
     /// the edge function is positive, and −1 where it is negative).
     Winding,
-    /// The rulings of a bilinear patch, or of the surface that continues it, that meet the ray's line: the roots `u₁ ≤
-    /// u₂` of `a·u² + 2·h·u + c = 0`.
+    /// The rulings of a bilinear patch, or of the surface that continues it, that meet the ray's line: the roots `w₁ ≤
+    /// w₂` of `a·u² + 2·h·u + c = 0`.
     Rulings,
     /// The intervals of the line within each operand of a CSG tree (`I₁` the first leaf's) and within the result, `I`.
     Intervals,
