@@ -30,7 +30,8 @@ pub(super) struct Plot {
     pub(super) range: [f64; 2],
     /// The formula of `F`, where it has one.
     pub(super) formula: Option<&'static str>,
-    /// The pieces of the function: from where on, the scale and the start of its variable, and the coefficients, the constant first.
+    /// The pieces of the function: from where on, the scale and the start of its variable, and the coefficients, the
+    /// constant first.
     pub(super) pieces: Vec<Vec<f64>>,
 }
 
