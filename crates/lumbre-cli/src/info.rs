@@ -5,12 +5,11 @@ use std::fmt;
 use std::path::PathBuf;
 
 use clap::Args;
-use lumbre::{CancelToken, Part, Scene, SceneInfo};
+use lumbre::{CancelToken, Part, Prepared, Scene, SceneInfo, Stage};
 use serde_json::json;
 
 use crate::checkpoint::open_part;
 use crate::console::{escaped_json, escaped_line};
-use crate::defaults::Defaults;
 use crate::failure::{Failure, print};
 use crate::memory::picture_bytes;
 use crate::reading::{ReadingArguments, print_warnings};
@@ -52,10 +51,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // What is in the file, before it is set on a stage: a model without a camera is measured as `lumbre render` shows
     // it.
     let mut info = SceneInfo::of(&desc);
-    let defaults = Defaults::stage(&mut desc, None, None);
+    let prepared = lumbre::prepare(&mut desc, &Stage::default(), None);
     let scene = Scene::of_file(desc, &arguments.scene[0], &mut diagnostics)?;
     (info.bounds, info.memory_bytes) = (scene.info().bounds, scene.info().memory_bytes);
-    let predicted = Predicted::of(&scene, &defaults);
+    let predicted = Predicted::of(&scene, &prepared);
     let caustics = caustics_not_found(&scene, &scene.options());
     if arguments.json {
         let animations = info.listing.animations.iter().map(|a| json!({ "name": a.name, "seconds": a.end }));
@@ -143,10 +142,8 @@ struct Predicted {
 
 impl Predicted {
     /// As `lumbre render` makes it, where no option asks for another.
-    fn of(scene: &Scene, defaults: &Defaults) -> Result<Self, lumbre::Error> {
-        let mut options = scene.options();
-        options.transparent = defaults.background().is_some();
-        options.guides = defaults.denoises();
+    fn of(scene: &Scene, prepared: &Prepared) -> Result<Self, lumbre::Error> {
+        let options = prepared.options(scene, None, None);
         Ok(Self {
             width: options.width,
             height: options.height,

@@ -51,7 +51,6 @@ mod checkpoint;
 #[cfg(not(target_family = "wasm"))]
 mod completions;
 mod console;
-mod defaults;
 #[cfg(not(target_family = "wasm"))]
 mod denoiser;
 #[cfg(not(target_family = "wasm"))]
@@ -113,7 +112,6 @@ mod view;
 mod viewing;
 
 pub use cast::{Query, cast};
-pub use defaults::Defaults;
 #[cfg(not(target_family = "wasm"))]
 pub use explain::program::Explainer;
 pub use explain::{Format, Request, SceneNames, explain};

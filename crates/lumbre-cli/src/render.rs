@@ -1,39 +1,38 @@
 //! `lumbre render`: renders a picture of a scene.
 
+mod picture;
+
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{IsTerminal, Read};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use lumbre::description::{Camera, CameraKind, FilmKind, GroundDesc, IntegratorKind};
+use lumbre::description::{CameraKind, FilmKind, IntegratorKind};
+use lumbre::formats::SceneFormat;
 use lumbre::formats::image::{ExrPrecision, ImageFormat};
-use lumbre::formats::{Diagnostics, SceneFormat, probe_writable};
 use lumbre::image::{Image, ToneMap};
 use lumbre::math::Elementary;
 use lumbre::shading::ShadingNormals;
 use lumbre::{
-    CancelToken, CheckpointSink, DVec3, Feature, Job, Picture, PixelBounds, RenderOptions, SaveOptions,
-    Scene, SceneDesc, Stage, Staged, Stop, in_words,
+    CancelToken, Feature, Job, Picture, PixelBounds, Prepared, RenderOptions, Scene, Stop, in_words,
 };
-use serde_json::json;
 
+use self::picture::{Context, First, FirstStage, Frame, picture};
 use crate::animation::{Animation, ENDINGS, is_animation};
-use crate::checkpoint::{Checkpoint, PartArguments, is_bare_part};
-use crate::defaults::Defaults;
+use crate::checkpoint::{PartArguments, is_bare_part};
 use crate::denoiser::{Choice, Denoiser};
-use crate::failure::{Failure, print_bytes};
+use crate::failure::Failure;
 use crate::names::one_of;
-use crate::output::{self, Inputs, Pictures, Replaced, is_standard_stream};
+use crate::output::{self, Inputs, Pictures, is_standard_stream};
 use crate::preview::{Preview, Protocol};
-use crate::progress::{Display, PictureViewer, ProgressReporter, Series, Style};
-use crate::reading::{Frames, ReadingArguments, print_warnings};
-use crate::report::{caustics_line, caustics_not_found, statistics, summary, warn_of_losses};
+use crate::progress::{PictureViewer, Series, Style};
+use crate::reading::{Frames, ReadingArguments};
 use crate::signals::{Deadline, Phase, Signals};
-use crate::staging::{self, Backdrop, StagingArguments};
+use crate::staging::{Backdrop, StagingArguments};
 use crate::tev::Tev;
 use crate::units::{self, Crop, spoken};
 use crate::view::ViewArguments;
@@ -251,74 +250,71 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     signals.enter(READING);
     let mut stage = arguments.staging.stage(arguments.size, arguments.reading.limits())?;
     arguments.view.set(&mut stage)?;
-    let render_start = start;
     // The first picture's name and exposure are used for all.
     let animation = arguments.animation()?;
-    let mut from_first = First { pattern: None, exposure: arguments.exposure, animation };
-    if let Some(Frames(frames)) = &arguments.frames {
-        let (first, last) = (*frames.start(), *frames.end());
-        let mut first_stage = FirstStage::default();
-        for number in frames.clone() {
-            let start = Instant::now();
-            signals.end_at(arguments.deadline(start));
-            signals.enter(READING);
-            let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
-            let series =
-                Series { number, done: number - first, count: last - first + 1, start: render_start };
-            let frame = Frame { number, is_first: number == first, series };
-            if !arguments.quiet {
-                say!("{series}");
-            }
-            let frame = Some((frame, &mut first_stage));
-            let context =
-                Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
-            picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
-            if cancel.is_cancelled() {
-                break;
-            }
-        }
-    } else {
-        let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
-        match arguments.staging.turntable() {
-            None => {
-                let context =
-                    Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
-                picture(context, desc, &mut diagnostics, None, &mut from_first)?;
-            }
-            Some(frames) => {
-                for turn in 0..frames {
-                    stage.turns = Some(f64::from(turn) / f64::from(frames));
-                    // The time of the first one includes reading.
-                    let start = if turn == 0 { start } else { Instant::now() };
-                    signals.end_at(arguments.deadline(start));
-                    let series = Series { number: turn + 1, done: turn, count: frames, start: render_start };
-                    let frame = Frame { number: turn + 1, is_first: turn == 0, series };
-                    // Each rotation has its own camera.
-                    let frame = Some((frame, &mut FirstStage::default()));
-                    let desc = desc.clone();
-                    let context = Context {
-                        arguments,
-                        stage: &stage,
-                        start,
-                        cancel: &cancel,
-                        signals: &signals,
-                        denoiser,
-                    };
-                    picture(context, desc, &mut diagnostics, frame, &mut from_first)?;
-                    if cancel.is_cancelled() {
-                        break;
-                    }
-                }
-            }
+    let mut first = First { pattern: None, exposure: arguments.exposure, animation };
+    let context = Context { arguments, stage: &stage, start, cancel: &cancel, signals: &signals, denoiser };
+    match (&arguments.frames, arguments.staging.turntable()) {
+        (Some(Frames(numbers)), _) => frames(context, numbers, &mut first)?,
+        (None, Some(count)) => turntable(context, count, &mut first)?,
+        (None, None) => {
+            let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
+            picture(context, desc, &mut diagnostics, None, &mut first)?;
         }
     }
-    if let Some(animation) = from_first.animation {
+    if let Some(animation) = first.animation {
         animation.finish()?;
     }
     match signals.received() {
         Some(status) => Err(Failure::Interrupted(status)),
         None => Ok(()),
     }
+}
+
+/// Renders frames of an animation, each read at its own time.
+fn frames(context: Context<'_>, numbers: &RangeInclusive<u32>, first: &mut First) -> Result<(), Failure> {
+    let Context { arguments, signals, .. } = context;
+    let mut first_stage = FirstStage::default();
+    let count = numbers.end() - numbers.start() + 1;
+    for number in numbers.clone() {
+        let start = Instant::now();
+        signals.end_at(arguments.deadline(start));
+        signals.enter(READING);
+        let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
+        let done = number - numbers.start();
+        let series = Series { number, done, count, start: context.start };
+        if !arguments.quiet {
+            say!("{series}");
+        }
+        let frame = Some((Frame { number, is_first: done == 0, series }, &mut first_stage));
+        picture(Context { start, ..context }, desc, &mut diagnostics, frame, first)?;
+        if context.cancel.is_cancelled() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Renders views from all around, one turn.
+fn turntable(context: Context<'_>, count: u32, first: &mut First) -> Result<(), Failure> {
+    let Context { arguments, signals, .. } = context;
+    let (desc, mut diagnostics) = arguments.reading.describe(&arguments.scene)?;
+    for done in 0..count {
+        let mut stage = context.stage.clone();
+        stage.turns = Some(f64::from(done) / f64::from(count));
+        // The time of the first one includes reading.
+        let start = if done == 0 { context.start } else { Instant::now() };
+        signals.end_at(arguments.deadline(start));
+        let series = Series { number: done + 1, done, count, start: context.start };
+        let frame = Frame { number: done + 1, is_first: done == 0, series };
+        // Each rotation has its own camera.
+        let frame = Some((frame, &mut FirstStage::default()));
+        picture(Context { stage: &stage, start, ..context }, desc.clone(), &mut diagnostics, frame, first)?;
+        if context.cancel.is_cancelled() {
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// Minimum render time, even if reading took all of the time.
@@ -550,347 +546,6 @@ impl Arguments {
     }
 }
 
-/// The stage of the first frame: camera and ground are the same in all others.
-#[derive(Default)]
-struct FirstStage {
-    cameras: Option<Vec<Camera>>,
-    ground: Option<GroundDesc>,
-}
-
-impl FirstStage {
-    fn hold(&mut self, staged: &Staged, desc: &mut SceneDesc) {
-        if staged.framed {
-            desc.cameras.clone_from(self.cameras.get_or_insert_with(|| desc.cameras.clone()));
-        }
-        if let (true, Some(ground)) = (staged.grounded, desc.ground) {
-            desc.ground = Some(*self.ground.get_or_insert(ground));
-        }
-    }
-}
-
-/// One of several pictures.
-#[derive(Clone, Copy)]
-struct Frame {
-    number: u32,
-    is_first: bool,
-    series: Series,
-}
-
-/// The data of the first picture that all others share.
-struct First {
-    /// The name, with `#` for the number of each picture.
-    pattern: Option<PathBuf>,
-    exposure: Option<f32>,
-    /// The file of all frames, if they are in one.
-    animation: Option<Animation>,
-}
-
-/// The inputs of a picture.
-#[derive(Clone, Copy)]
-struct Context<'a> {
-    arguments: &'a Arguments,
-    stage: &'a Stage,
-    /// The start of its reading.
-    start: Instant,
-    cancel: &'a CancelToken,
-    signals: &'a Signals,
-    denoiser: Option<&'a Denoiser>,
-}
-
-/// Renders and saves one picture, the only one or one of several frames.
-fn picture(
-    context: Context<'_>,
-    mut desc: SceneDesc,
-    diagnostics: &mut Diagnostics,
-    frame: Option<(Frame, &mut FirstStage)>,
-    first: &mut First,
-) -> Result<(), Failure> {
-    let Context { arguments, stage, start, cancel, signals, denoiser } = context;
-    signals.enter(Phase::Preparing("building the scene"));
-    let is_first = frame.as_ref().is_none_or(|(frame, _)| frame.is_first);
-    let number = frame.as_ref().map(|(frame, _)| frame.number);
-    let series = frame.as_ref().map(|(frame, _)| frame.series);
-    let kind = arguments.integrator.unwrap_or(desc.integrator.kind);
-    if denoiser.is_some() && kind.is_feature() {
-        let why =
-            "--denoise cannot be used with --integrator normals, depth, albedo or uv: they have no noise";
-        return Err(Failure::Usage(why.to_owned()));
-    }
-    let is_of_light = kind.needs_light();
-    let mut stage = stage.clone();
-    stage.ground = Defaults::ground(stage.ground, is_of_light);
-    let staged = stage.set(&mut desc);
-    let defaults = Defaults::new(staged, is_of_light);
-    if let Some((_, first_stage)) = frame {
-        first_stage.hold(&staged, &mut desc);
-    }
-    let behind = arguments.staging.behind(&defaults, arguments.reading.limits_beside(diagnostics))?;
-    let name = &arguments.scene[0];
-    let mut of_frames = Diagnostics::with_strictness(arguments.reading.strictness());
-    arguments.reading.check_build(&desc, diagnostics)?;
-    let scene = Scene::of_file(desc, name, if is_first { diagnostics } else { &mut of_frames })?;
-    let load_time = start.elapsed().saturating_sub(scene.build_time());
-    if !arguments.quiet && is_first {
-        print_warnings(diagnostics);
-    }
-    let inputs = diagnostics.files_read().iter().map(PathBuf::as_path).chain(arguments.inputs());
-    let inputs = Inputs::of(inputs);
-    let output = match &first.pattern {
-        Some(pattern) => pattern.clone(),
-        None => first.pattern.insert(arguments.pattern(&scene, &inputs)?).clone(),
-    };
-    let named = arguments.named(&output);
-    arguments.check_format(&named)?;
-    let film = if kind.is_feature() { FilmKind::Rgb } else { scene.resolved().film().kind };
-    check_film(&named, film)?;
-    arguments.staging.check(Some(&named))?;
-    arguments.parts.check(&arguments.scene, &named, arguments.spp)?;
-    let is_piped = is_standard_stream(&output);
-    let output = number.map_or(named.to_path_buf(), |number| staging::frame_name(&output, number));
-    for path in std::iter::once(&output).filter(|_| !is_piped).chain(&arguments.stats) {
-        inputs.refuse(path)?;
-        probe_writable(path).map_err(|e| Failure::from(lumbre::Error::from(e)))?;
-    }
-    let mut options = options(arguments, &scene)?;
-    options.film = film;
-    options.transparent = behind.is_transparent();
-    options.spectral &= kind.carries_wavelengths();
-    if arguments.spectral && !kind.carries_wavelengths() {
-        return Err(Failure::Usage("--spectral works only with --integrator path or caustics".to_owned()));
-    }
-    options.spectral |= arguments.spectral;
-    let samples_are_asked = arguments.spp.is_some()
-        || arguments.time.is_some()
-        || arguments.noise.is_some()
-        || arguments.parts.keeps_sums();
-    // Parts store samples, not denoised pictures.
-    let denoises = arguments.denoise.is_none() && !arguments.parts.keeps_sums() && defaults.denoises();
-    let denoiser = denoiser.or(denoises.then_some(&Denoiser::Own));
-    if let (Some(spp), Some(_), false) = (defaults.spp(&scene), denoiser, samples_are_asked) {
-        options.stop.spp = spp;
-    }
-    // Open Image Denoise needs albedo and normals.
-    options.features |= matches!(denoiser, Some(Denoiser::Oidn(_)));
-    options.guides = denoiser.is_some();
-    let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
-    arguments.reading.memory().check_picture(&options, held)?;
-    arguments.view.check_camera(&scene, options.camera)?;
-    let warn = |what: String| match arguments.reading.is_strict() {
-        true => Err(Failure::input(what)),
-        false if arguments.quiet || !is_first => Ok(()),
-        false => {
-            say!("warning: {what}");
-            Ok(())
-        }
-    };
-    if staged.framed && scene.resolved().accel().primitive_count() == 0 {
-        warn(format!("{}: the scene has no shapes: the picture shows only the background", name.display()))?;
-    }
-    if staged.guessed_up && is_first && !arguments.quiet {
-        say!("{}: z is up, since the model stands on a plane of z (--up y makes y up)", name.display());
-    }
-    if !options.spectral && is_first && is_of_light && scene.resolved().disperses() {
-        let what =
-            "glass does not disperse light without --spectral: its index at 587.6 nm is used for all colours";
-        warn(format!("{}: {what}", name.display()))?;
-    }
-    if scene.is_dark() && is_of_light {
-        warn(format!("{}: the scene has no light: its picture is black", name.display()))?;
-    }
-    let camera = scene.resolved().cameras().get(options.camera);
-    if let (Some(ground), Some(camera)) = (scene.resolved().ground(), camera)
-        && staging::is_below(ground, camera.world_from_camera.point(DVec3::ZERO))
-    {
-        warn(format!(
-            "{}: the camera is below the ground, which hides everything (--ground none)",
-            name.display()
-        ))?;
-    }
-
-    let exposure = match first.exposure {
-        Some(exposure) => exposure,
-        None if is_for_displays(&output) => {
-            let stops = defaults.exposure(&scene, &options)?;
-            if stops != 0.0 && !arguments.quiet {
-                say!(
-                    "exposed by {stops:.1} stops, for the brightness of the file's lights (--exposure 0 turns this off)"
-                );
-            }
-            *first.exposure.insert(stops)
-        }
-        None => *first.exposure.insert(0.0),
-    };
-
-    let tone_map = arguments.tonemap.unwrap_or(defaults.tone_map());
-    let precision = match scene.resolved().film().single_precision {
-        true => ExrPrecision::Float,
-        false => ExrPrecision::Half,
-    };
-
-    let is_silent = arguments.quiet || arguments.preview.is_some();
-    let style = if is_silent { Style::None } else { arguments.progress };
-    let viewers = arguments.viewers(&output, tone_map, exposure)?;
-    let progress =
-        ProgressReporter { display: Display::new(style), signals, viewers, series, pass: Mutex::default() };
-    let render_start = Instant::now();
-    if let Some(deadline) = arguments.deadline(start) {
-        // The time left after reading and building.
-        let left = deadline.at.saturating_duration_since(render_start);
-        options.stop.time = Some(left.max(MIN_TIME));
-    }
-    let memory = arguments.reading.memory();
-    let files: Vec<PathBuf> =
-        diagnostics.files_read().iter().cloned().chain(arguments.inputs().map(Path::to_owned)).collect();
-    let mut settings = arguments.settings();
-    settings.push(("picture".to_owned(), in_words(&number)));
-    // The first picture determines camera and ground.
-    settings.push(("first picture".to_owned(), in_words(&series.map(|series| series.number - series.done))));
-    let (job_options, shown) = (options.clone(), arguments.shown(&behind, tone_map, exposure, precision));
-    // If files cannot be read again, such as standard input, the render has no identity.
-    let job = move || {
-        let files = files.iter().map(PathBuf::as_path);
-        Ok(Job { shown, ..Job::new(files, settings, &job_options)? })
-    };
-    let job: Box<dyn FnOnce() -> Result<Job, lumbre::Error> + Send> =
-        if number.is_some() && arguments.parts.resumes() {
-            let found = job().map_err(Failure::from)?;
-            if is_done_before(&output, &found, &options) {
-                if !arguments.quiet {
-                    say!("{}: already rendered", output.display());
-                }
-                return Ok(());
-            }
-            Box::new(move || Ok(found))
-        } else {
-            Box::new(job)
-        };
-    let (checkpoint, state) = Checkpoint::begin(
-        &arguments.parts,
-        &output,
-        memory,
-        options.stop.spp,
-        arguments.quiet,
-        number.is_some(),
-        job,
-    )?;
-    let keep = |state| checkpoint.keep(state);
-    let keeper = checkpoint.every().map(|every| CheckpointSink { every, keep: &keep });
-    signals.enter(Phase::Rendering);
-    let (mut picture, state) = scene.render_from(&options, &progress, cancel, state, keeper.as_ref())?;
-    let render_time = render_start.elapsed();
-    progress.finish(picture.image());
-    signals.enter(Phase::Saving);
-    let is_done = !cancel.is_cancelled();
-    match checkpoint.end(&state, is_done) {
-        Ok(Some(path)) if !is_done && !arguments.quiet => {
-            say!("{}: checkpoint saved (--resume continues from it)", path.display());
-        }
-        Ok(None) if !is_done && !arguments.quiet && checkpoint.is_possible() => {
-            say!(
-                "hint: --checkpoint FILE saves the samples, for --resume (renders of more than two minutes do so by themselves)"
-            );
-        }
-        Ok(_) => {}
-        // The picture may still be saved.
-        Err(why) => say!("warning: cannot write the checkpoint: {why}"),
-    }
-    match check_whole(arguments, &picture, signals.received()) {
-        // An interrupted animation has the frames that are done.
-        Err(Failure::Interrupted(_)) if first.animation.as_ref().is_some_and(Animation::has_frames) => {
-            return Ok(());
-        }
-        whole => whole?,
-    }
-    let denoised = match denoiser {
-        Some(denoiser) if denoiser.takes(picture.stats().stride) => {
-            Some((denoiser.name(), denoiser.apply(&mut picture, options.threads)?))
-        }
-        _ => None,
-    };
-
-    let pictures = std::iter::once(&output).filter(|_| first.animation.is_none());
-    let replaced: Vec<Replaced<'_>> =
-        pictures.chain(&arguments.stats).map(|path| Replaced::by(path)).collect();
-    let stream = signals.enter_writing(&output)?;
-    let save_start = Instant::now();
-    let mut save = SaveOptions::default();
-    (save.exr_precision, save.tone_map, save.exposure) = (precision, tone_map, exposure);
-    if let Ok(job) = checkpoint.job() {
-        let first = options.first_sample;
-        save.metadata = job.metadata(&(first..first + picture.stats().spp));
-    }
-    if arguments.metadata == Metadata::Full {
-        let words: Vec<String> = std::env::args().collect();
-        save.metadata.push(("lumbreCommand".to_owned(), words.join(" ")));
-        save.metadata.push(("lumbreSeconds".to_owned(), format!("{:.2}", render_time.as_secs_f64())));
-    }
-    let picture = match behind {
-        Backdrop::Background(background) => picture.over(background),
-        Backdrop::Lights | Backdrop::Nothing => picture,
-    };
-    let saved = if let Some(animation) = &mut first.animation {
-        animation.add(&picture, &save)
-    } else if is_bare_part(&output) {
-        checkpoint.part(&state)?.save(&output).map_err(Failure::from)
-    } else if arguments.parts.keeps_sums() {
-        picture
-            .save_with_part(&output, &save, &arguments.aov, &checkpoint.part(&state)?)
-            .map_err(Failure::from)
-    } else if is_piped {
-        let format = arguments.output_format.unwrap_or(ImageFormat::Png);
-        let encoded = picture.encode(format, &save, &arguments.aov).map_err(Failure::from);
-        encoded.and_then(|encoded| print_bytes(&encoded))
-    } else {
-        picture.save_with(&output, &save, &arguments.aov).map_err(Failure::from)
-    };
-    if let Err(Failure::Io(why)) = saved {
-        return Err(Failure::Io(match checkpoint.rescue(&state, &output) {
-            Some(kept) => format!(
-                "{why}; the samples are saved in {} (lumbre merge {} -o PICTURE makes a picture of them)",
-                kept.display(),
-                kept.display()
-            ),
-            None => why,
-        }));
-    }
-    saved?;
-    drop(stream);
-    if is_done {
-        checkpoint.remove();
-    }
-    let save_time = save_start.elapsed();
-    warn_of_losses(arguments.threads.is_some(), &picture);
-    let is_told = is_first && !arguments.quiet && is_of_light && !scene.is_dark();
-    if is_told && picture.stats().spp > 0 && is_nearly_black(picture.image(), exposure) {
-        say!("{DARK_HINT}");
-    }
-    if let Some(path) = &arguments.stats {
-        let seconds = json!({
-            "load": load_time.as_secs_f64(),
-            "build": scene.build_time().as_secs_f64(),
-            "render": render_time.as_secs_f64(),
-            "denoise": denoised.map(|(_, time)| time.as_secs_f64()),
-            "save": save_time.as_secs_f64(),
-        });
-        let report = statistics(&scene, &picture, seconds, diagnostics.lines());
-        let pipe = Signals::open_pipe(path)?;
-        let stream = signals.enter_writing(path)?;
-        drop(pipe);
-        lumbre::formats::atomic_write(path, |file| writeln!(file, "{report:#}"))
-            .map_err(|e| Failure::from(lumbre::Error::from(e)))?;
-        drop(stream);
-    }
-    if !arguments.quiet {
-        replaced.iter().for_each(Replaced::say);
-        let name = if is_piped { "standard output".into() } else { output.display().to_string() };
-        summary(arguments.verbose, &options.stop, &scene, &picture, &name, render_time, denoised);
-        if is_first && let Some(share) = caustics_not_found(&scene, &options) {
-            say!("hint: {}", caustics_line(share));
-        }
-    }
-    Ok(())
-}
-
 /// Whether a file is this render's picture with all samples, according to its metadata.
 fn is_done_before(path: &Path, job: &Job, options: &RenderOptions) -> bool {
     const NEAR: u64 = 64 << 10;
@@ -1012,11 +667,13 @@ fn check_whole(arguments: &Arguments, picture: &Picture, signal: Option<u8>) -> 
     }
 }
 
-fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failure> {
-    let mut options = scene.options();
-    if let Some((width, height)) = arguments.size {
-        options.resize(scene.resolved().film(), width, height);
-    }
+fn options(
+    arguments: &Arguments,
+    scene: &Scene,
+    prepared: &Prepared,
+    is_denoised: bool,
+) -> Result<RenderOptions, Failure> {
+    let mut options = prepared.options(scene, arguments.integrator, arguments.size);
     options.crop = match arguments.crop {
         None => options.crop,
         Some(Crop::Pixels([x0, y0, x1, y1])) if x0 >= options.width || y0 >= options.height => {
@@ -1031,12 +688,14 @@ fn options(arguments: &Arguments, scene: &Scene) -> Result<RenderOptions, Failur
     if let Some(wanted) = &arguments.camera {
         options.camera = camera(scene, wanted)?;
     }
-    options.integrator.kind = arguments.integrator.unwrap_or(options.integrator.kind);
     options.integrator.shading_normals =
         arguments.shading_normals.unwrap_or(options.integrator.shading_normals);
     options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
-    let usual = Stop::usual(options.integrator.kind, scene.resolved().sampler().spp);
+    let usual = match is_denoised {
+        true => options.stop.clone(),
+        false => Stop::usual(options.integrator.kind, scene.resolved().sampler().spp),
+    };
     let spp = match arguments.spp {
         Some(spp) => spp,
         None if arguments.noise.is_some() => Stop::MAX_FOR_NOISE,

@@ -4,10 +4,9 @@ use std::path::Path;
 
 use lumbre::description::{FilmKind, IntegratorKind};
 use lumbre::formats::Diagnostics;
-use lumbre::{RenderOptions, Scene, SceneDesc};
+use lumbre::{Prepared, RenderOptions, Scene, SceneDesc};
 use lumbre_viewer::Hidden;
 
-use crate::defaults::Defaults;
 use crate::failure::Failure;
 use crate::reading::ReadingArguments;
 use crate::render::camera;
@@ -33,11 +32,9 @@ pub(crate) struct SceneRequest<'a> {
 /// A staged scene.
 pub(crate) struct PreparedScene {
     pub(crate) scene: Scene,
-    pub(crate) defaults: Defaults,
+    pub(crate) prepared: Prepared,
     pub(crate) behind: Backdrop,
     pub(crate) options: RenderOptions,
-    /// Whether its pictures show light, and not features such as normals.
-    pub(crate) is_of_light: bool,
     pub(crate) diagnostics: Diagnostics,
 }
 
@@ -49,29 +46,21 @@ pub(crate) fn shown(mut desc: SceneDesc, wish: &SceneRequest<'_>) -> Result<Prep
     let SceneRequest { name, size, camera: wanted, integrator, view, staging, reading, hidden } = *wish;
     let mut stage = staging.stage(size, reading.limits())?;
     view.set(&mut stage)?;
-    let kind = integrator.unwrap_or(desc.integrator.kind);
-    let is_of_light = kind.needs_light();
-    stage.ground = Defaults::ground(stage.ground, is_of_light);
-    let defaults = Defaults::new(stage.set(&mut desc), is_of_light);
+    let prepared = lumbre::prepare(&mut desc, &stage, integrator);
     if let Some(hidden) = hidden {
         hidden.apply(&mut desc);
     }
-    let behind = staging.behind(&defaults, reading.limits())?;
+    let behind = staging.behind(&prepared, reading.limits())?;
     let mut diagnostics = Diagnostics::with_strictness(reading.strictness());
     reading.check_build(&desc, &diagnostics)?;
     let scene = Scene::of_file(desc, name, &mut diagnostics)?;
-    let mut options = scene.options();
-    options.integrator.kind = kind;
+    let mut options = prepared.options(&scene, integrator, size);
     // What is looked at has no channels besides its colours.
     options.film = FilmKind::Rgb;
-    options.spectral &= kind.carries_wavelengths();
-    if let Some((width, height)) = size {
-        options.resize(scene.resolved().film(), width, height);
-    }
     if let Some(wanted) = wanted {
         options.camera = camera(&scene, wanted)?;
     }
     view.check_camera(&scene, options.camera)?;
     options.transparent = behind.is_transparent();
-    Ok(PreparedScene { scene, defaults, behind, options, is_of_light, diagnostics })
+    Ok(PreparedScene { scene, prepared, behind, options, diagnostics })
 }

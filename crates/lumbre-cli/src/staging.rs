@@ -11,10 +11,9 @@ use lumbre::formats::Limits;
 use lumbre::formats::diagnostic::nearest_name;
 use lumbre::formats::image::ImageFormat;
 use lumbre::image::{Image, Rgb};
-use lumbre::{Background, EnvironmentDesc, Ground, Stage, Surroundings};
+use lumbre::{Background, EnvironmentDesc, Ground, Prepared, Stage, Surroundings};
 
 use crate::animation::{ENDINGS, is_animation};
-use crate::defaults::Defaults;
 use crate::failure::Failure;
 use crate::names::one_of;
 use crate::units;
@@ -179,9 +178,9 @@ impl StagingArguments {
     ///
     /// # Errors
     /// Unreadable files.
-    pub(crate) fn behind(&self, defaults: &Defaults, limits: Limits) -> Result<Backdrop, Failure> {
+    pub(crate) fn behind(&self, prepared: &Prepared, limits: Limits) -> Result<Backdrop, Failure> {
         Ok(match &self.background {
-            None => defaults.background().map_or(Backdrop::Lights, Backdrop::Background),
+            None => prepared.background().map_or(Backdrop::Lights, Backdrop::Background),
             Some(BackgroundArgument::Lights) => Backdrop::Lights,
             Some(BackgroundArgument::Transparent) => Backdrop::Nothing,
             Some(BackgroundArgument::Studio) => Backdrop::Background(Background::studio()),

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use clap::Args;
 use lumbre::image::ToneMap;
-use lumbre::{CancelToken, ErrorKind, RenderOptions, SaveOptions, SceneDesc, Stop};
+use lumbre::{CancelToken, ErrorKind, RenderOptions, SceneDesc, Stop};
 use lumbre_viewer::{Built, Explain, Hidden, Moment, Options, Read, Source, SourceError, Viewer, export};
 
 use crate::explain::program::Explainer;
@@ -318,34 +318,30 @@ impl Files {
             hidden,
         };
         let explain = Some(Box::new(Explainer::new(&desc, self.name())) as Box<dyn Explain>);
-        let PreparedScene { scene, defaults, behind, mut options, is_of_light, diagnostics } =
-            shown(desc, &wish)?;
+        let PreparedScene { scene, prepared, behind, mut options, diagnostics } = shown(desc, &wish)?;
         let mut warnings = diagnostics.lines();
         options.threads = rayon::current_num_threads();
-        let own = defaults.spp(&scene).unwrap_or(options.stop.spp);
         let Arguments { spp, noise, min_spp, .. } = &*self.arguments;
         (options.stop.noise, options.stop.min_spp) = (*noise, *min_spp);
-        options.stop.spp = spp.unwrap_or(if noise.is_some() { Stop::MAX_FOR_NOISE } else { own });
+        options.stop.spp =
+            spp.unwrap_or(if noise.is_some() { Stop::MAX_FOR_NOISE } else { options.stop.spp });
         let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
         reading.memory().check_picture(&options, held)?;
-        if scene.is_dark() && is_of_light {
+        if scene.is_dark() && prepared.is_of_light() {
             warnings
                 .push(format!("warning: {}: the scene has no light: its picture is black", name.display()));
         }
-        let mut save = SaveOptions::default();
+        let mut save = prepared.save_options(&scene);
         save.exposure = match self.arguments.exposure {
             Some(exposure) => exposure,
-            None => defaults.exposure(&scene, &options)?,
+            None => prepared.exposure(&scene, &options)?,
         };
-        save.tone_map = self.arguments.tonemap.unwrap_or(defaults.tone_map());
-        if scene.resolved().film().single_precision {
-            save.exr_precision = lumbre::formats::image::ExrPrecision::Float;
-        }
+        save.tone_map = self.arguments.tonemap.unwrap_or(save.tone_map);
         let background = match behind {
             Backdrop::Background(background) => Some(background),
             Backdrop::Lights | Backdrop::Nothing => None,
         };
-        Ok(Built { scene, options, save, background, denoise: defaults.denoises(), warnings, explain })
+        Ok(Built { scene, options, save, background, denoise: prepared.denoises(), warnings, explain })
     }
 }
 

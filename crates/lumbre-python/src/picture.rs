@@ -63,14 +63,12 @@ impl Look {
         options: &RenderOptions,
         behind: Backdrop,
     ) -> Result<Self, lumbre::Error> {
-        let PreparedScene { scene, defaults } = shown;
+        let PreparedScene { scene, prepared } = shown;
+        let save = prepared.save_options(scene);
         Ok(Self {
-            tone_map: defaults.tone_map(),
-            exposure: defaults.exposure(scene, options)?,
-            precision: match scene.resolved().film().single_precision {
-                true => ExrPrecision::Float,
-                false => ExrPrecision::Half,
-            },
+            tone_map: save.tone_map,
+            exposure: prepared.exposure(scene, options)?,
+            precision: save.exr_precision,
             background: match behind {
                 Backdrop::Background(background) => Some(background),
                 Backdrop::Lights | Backdrop::Nothing => None,

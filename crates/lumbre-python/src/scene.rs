@@ -6,11 +6,11 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
-use lumbre::description::{ClearSky, FilmKind, IntegratorKind, LightDesc, SkyDesc, SunPositionError};
+use lumbre::description::{ClearSky, IntegratorKind, LightDesc, SkyDesc, SunPositionError};
 use lumbre::formats::{Diagnostics, Strictness};
 use lumbre::{
     Background, CancelToken, DVec3, Ground, Job, Part as PartDesc, PixelBounds, Progress, Ray, ReadOptions,
-    RenderOptions, SceneBuilder, SceneDesc, State, Transform, UpAxis,
+    RenderOptions, SceneBuilder, SceneDesc, State, Stop, Transform, UpAxis,
 };
 use lumbre_cli::{Format, Language, Request, SceneNames, memory_left};
 use numpy::{PyArray1, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -570,27 +570,19 @@ impl Scene {
         let wish = wish(given, size, integrator, view.as_ref())?;
         let settings = wish.settings();
         let shown = self.shown(py, wish)?;
-        let mut options = shown.scene.options();
+        let mut options = shown.prepared.options(&shown.scene, integrator, size);
         options.view = view;
-        options.integrator.kind = integrator.unwrap_or(options.integrator.kind);
-        if options.integrator.kind.is_feature() {
-            options.film = FilmKind::Rgb;
-        }
-        options.spectral &= options.integrator.kind.carries_wavelengths();
-        if let Some((width, height)) = size {
-            options.resize(shown.scene.resolved().film(), width, height);
-        }
         // As the program does.
         let is_given = |name: &str| given.get_item(name).is_ok_and(|found| found.is_some());
         let samples_are_asked = ["spp", "time", "noise", "part"].into_iter().any(is_given);
         // Parts hold samples alone.
         let keeps_part = named(given, "part")?.unwrap_or(false);
-        let by_default = shown.defaults.denoises() && !keeps_part;
+        let by_default = shown.prepared.denoises() && !keeps_part;
         let denoises = named(given, "denoise")?.unwrap_or(by_default);
-        if let (Some(spp), true, false) = (shown.defaults.spp(&shown.scene), denoises, samples_are_asked) {
-            options.stop.spp = spp;
+        if !denoises || samples_are_asked {
+            options.stop = Stop::usual(options.integrator.kind, shown.scene.resolved().sampler().spp);
         }
-        let behind = shown.defaults.background().map_or(Backdrop::Lights, Backdrop::Background);
+        let behind = shown.prepared.background().map_or(Backdrop::Lights, Backdrop::Background);
         let mut asked = RenderRequest { shown, options, behind, denoises, keeps_part: false, settings };
         for (name, value) in given {
             let name: String = name.extract()?;

@@ -5,8 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lumbre::description::{ClearSky, GroundPlane, IntegratorKind, LightDesc};
-use lumbre::{DVec3, EnvironmentDesc, Ground, SceneDesc, Setting, Stage, Surroundings, Viewpoint};
-use lumbre_cli::Defaults;
+use lumbre::{DVec3, EnvironmentDesc, Ground, Prepared, SceneDesc, Setting, Stage, Surroundings, Viewpoint};
 
 /// How a scene is to be shown.
 #[derive(Clone, Debug, Default)]
@@ -56,7 +55,7 @@ impl Around {
 /// A scene on its stage, as the program shows it.
 pub(crate) struct PreparedScene {
     pub(crate) scene: Arc<lumbre::Scene>,
-    pub(crate) defaults: Defaults,
+    pub(crate) prepared: Prepared,
 }
 
 /// A description with its overrides, and the trees of it.
@@ -112,7 +111,7 @@ impl Stages {
             |ground: &GroundPlane| wish.eye.is_some_and(|eye| (eye - ground.point).dot(ground.normal) < 0.0);
         // From below, ground that nobody asked for would hide everything.
         if wish.ground == Ground::Automatic
-            && shown.defaults.is_grounded()
+            && shown.prepared.is_grounded()
             && shown.scene.resolved().ground().is_some_and(is_hidden)
         {
             return self.kept_or_staged(&SceneRequest { ground: Ground::None, ..wish });
@@ -143,12 +142,12 @@ impl Stages {
             Around::Light(light) => Surroundings::Light(Box::new(LightDesc::clone(light))),
             Around::Sky(sky) => Surroundings::Sky(sky.clone()),
         };
-        let defaults = Defaults::on(&stage, &mut desc, wish.integrator);
-        if defaults.is_bare() && !wish.view.changes_lens() {
-            return Ok(PreparedScene { scene: Arc::clone(&base.scene), defaults });
+        let prepared = lumbre::prepare(&mut desc, &stage, wish.integrator);
+        if prepared.is_bare() && !wish.view.changes_lens() {
+            return Ok(PreparedScene { scene: Arc::clone(&base.scene), prepared });
         }
-        if !defaults.is_grounded() {
-            return Ok(PreparedScene { scene: Arc::new(base.scene.relit(&desc)?), defaults });
+        if !prepared.is_grounded() {
+            return Ok(PreparedScene { scene: Arc::new(base.scene.relit(&desc)?), prepared });
         }
         let wanted = desc.ground;
         let stands_on = |scene: &Arc<lumbre::Scene>| {
@@ -158,11 +157,11 @@ impl Stages {
             })
         };
         if let Some(tree) = found(&base.grounded, stands_on) {
-            return Ok(PreparedScene { scene: Arc::new(tree.relit(&desc)?), defaults });
+            return Ok(PreparedScene { scene: Arc::new(tree.relit(&desc)?), prepared });
         }
         let scene = Arc::new(self.built(desc)?);
         keep(&base.grounded, Arc::clone(&scene));
-        Ok(PreparedScene { scene, defaults })
+        Ok(PreparedScene { scene, prepared })
     }
 
     fn built(&self, desc: SceneDesc) -> Result<lumbre::Scene, lumbre::Error> {

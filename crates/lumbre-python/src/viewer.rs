@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use lumbre::{EnvironmentDesc, ReadOptions, SaveOptions, SceneDesc, Stage, Surroundings};
-use lumbre_cli::{Defaults, Explainer};
+use lumbre::{EnvironmentDesc, ReadOptions, SceneDesc, Stage, Surroundings};
+use lumbre_cli::Explainer;
 use lumbre_viewer::{Built, Closer, Hidden, Moment, Options, Read, Source, SourceError};
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::prelude::*;
@@ -65,27 +65,21 @@ impl Source for Live {
         if let Some(path) = &self.environment {
             stage.surroundings = Surroundings::Map(environment(path)?);
         }
-        let defaults = Defaults::on(&stage, &mut desc, None);
+        let prepared = lumbre::prepare(&mut desc, &stage, None);
         hidden.apply(&mut desc);
         let scene = lumbre::Scene::from_description(desc)?;
-        let mut options = scene.options();
-        if let Some((width, height)) = self.size {
-            options.resize(scene.resolved().film(), width, height);
-        }
-        options.transparent = defaults.background().is_some();
+        let mut options = prepared.options(&scene, None, self.size);
         options.threads = rayon::current_num_threads();
-        let own = defaults.spp(&scene).unwrap_or(options.stop.spp);
-        options.stop.spp = self.spp.unwrap_or(own);
+        options.stop.spp = self.spp.unwrap_or(options.stop.spp);
         self.check(&options)?;
-        let mut save = SaveOptions::default();
-        save.tone_map = defaults.tone_map();
-        save.exposure = defaults.exposure(&scene, &options)?;
+        let mut save = prepared.save_options(&scene);
+        save.exposure = prepared.exposure(&scene, &options)?;
         Ok(Built {
             scene,
             options,
             save,
-            background: defaults.background(),
-            denoise: defaults.denoises(),
+            background: prepared.background(),
+            denoise: prepared.denoises(),
             warnings: Vec::new(),
             explain: Some(Box::new(explain)),
         })

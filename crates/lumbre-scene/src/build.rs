@@ -1,5 +1,6 @@
 //! From a description to a scene.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, BilinearPatch, PlacedShape, Shape};
@@ -24,8 +25,8 @@ use crate::specular::Specular;
 use crate::surface::{ColourRamp, Form, SurfaceEntry};
 use crate::{
     AreaLightDesc, BuildError, BuildWarning, Camera, Emission, FilmDesc, GeometryDesc, GroundPlane,
-    InstanceDesc, LightDesc, LightId, MeshDesc, ObjectDesc, Scene, SceneDesc, ShapeDesc, SurfaceTable,
-    camera, csg, custom, extent, framing, ground, stage, studio,
+    InstanceDesc, LightDesc, LightId, MaterialId, MeshDesc, NamedMaterial, ObjectDesc, Scene, SceneDesc,
+    ShapeDesc, SurfaceTable, camera, csg, custom, extent, framing, ground, stage, studio,
 };
 
 impl Scene {
@@ -63,10 +64,7 @@ impl Scene {
             listing: _,
         } = desc;
         camera::check(&cameras)?;
-        let mut builder = Builder {
-            materials: materials.into_iter().map(|named| named.material).collect(),
-            ..Builder::default()
-        };
+        let mut builder = Builder { materials: numbered(materials), ..Builder::default() };
 
         let is_moving = |i: &InstanceDesc| matches!(i.world_from_object, Placement::Moving(_));
         let deforms = |shape: &ShapeDesc| matches!(&shape.geometry, GeometryDesc::Mesh(mesh) | GeometryDesc::BilinearMesh(mesh) if mesh.motion.is_some());
@@ -209,10 +207,20 @@ impl Standing {
     }
 }
 
+/// Materials, each with the number of the first that is the same one: a material may be listed several times.
+fn numbered(materials: Vec<NamedMaterial>) -> Vec<(MaterialId, Arc<Material>)> {
+    let mut firsts = HashMap::new();
+    let numbers = (0..).zip(materials).map(|(number, NamedMaterial { material, .. })| {
+        let first = *firsts.entry(Arc::as_ptr(&material)).or_insert(MaterialId(number));
+        (first, material)
+    });
+    numbers.collect()
+}
+
 /// The state of building trees.
 #[derive(Default)]
 pub(crate) struct Builder {
-    pub materials: Vec<Arc<Material>>,
+    pub materials: Vec<(MaterialId, Arc<Material>)>,
     pub entries: Vec<SurfaceEntry>,
     lights: Vec<Light>,
     /// One for each light.
@@ -488,15 +496,15 @@ impl Builder {
 
     /// The material and properties of a shape, without its geometry and its light.
     pub(crate) fn entry(&self, desc: &ShapeDesc) -> Result<SurfaceEntry, BuildError> {
-        let material = match desc.material {
-            None => None,
+        let (material_id, material) = match desc.material {
+            None => (MaterialId(u32::MAX), None),
             Some(id) => {
-                let material = self.materials.get(id.0 as usize).ok_or(BuildError::NoSuchMaterial {
+                let (id, material) = self.materials.get(id.0 as usize).ok_or(BuildError::NoSuchMaterial {
                     shape: desc.index,
                     material: id.0,
                     count: self.materials.len(),
                 })?;
-                (!matches!(material.kind, MaterialKind::Interface)).then(|| material.clone())
+                (*id, (!matches!(material.kind, MaterialKind::Interface)).then(|| material.clone()))
             }
         };
         Ok(SurfaceEntry {
@@ -504,6 +512,7 @@ impl Builder {
             is_textured: material.as_ref().is_some_and(|material| !material.is_uniform())
                 || desc.alpha.as_ref().is_some_and(|alpha| !alpha.is_constant()),
             material,
+            material_id,
             emission: None,
             light: None,
             alpha: desc.alpha.clone(),

@@ -5,7 +5,7 @@ use lumbre_math::rounding::offset_point;
 use lumbre_math::{DVec3, Vec2};
 use lumbre_shading::{Bsdf, LocalSurface, Material, ShadingFrame, ShadingNormals, Spectrum, TextureContext};
 
-use crate::{Boundary, Emission, Footprint, LightId, LightSample};
+use crate::{Boundary, Emission, Footprint, LightId, LightSample, MaterialId};
 
 /// A ray's hit with everything that a path needs to continue.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub struct Interaction<'s> {
     pub at: TextureContext,
     /// The material; `None` for an interface.
     pub material: Option<&'s Material>,
+    /// The number of the material: the same for all surfaces that have this material.
+    pub material_id: MaterialId,
     /// The emission.
     pub emission: Option<&'s Emission>,
     /// The light that samples this surface.

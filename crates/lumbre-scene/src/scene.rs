@@ -439,6 +439,7 @@ impl Scene {
             towards_origin: -direction,
             front,
             material: entry.material.as_deref(),
+            material_id: entry.material_id,
             emission: entry.emission.as_ref(),
             light,
             boundary: self.entries[hit.id as usize].boundary,

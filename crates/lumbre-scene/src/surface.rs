@@ -8,7 +8,7 @@ use lumbre_math::{DVec2, DVec3, Transform, Vec2, Vec3, Vec4};
 use lumbre_shading::{FloatTexture, LocalSurface, Material, Spectrum, TextureContext, VertexData};
 
 use crate::seams::Pieces;
-use crate::{Boundary, ColouredShape, Emission, Footprint, LightId, MeshDesc};
+use crate::{Boundary, ColouredShape, Emission, Footprint, LightId, MaterialId, MeshDesc};
 
 /// The surface data for one id of the tree.
 #[derive(Clone, Debug)]
@@ -17,6 +17,8 @@ pub(crate) struct SurfaceEntry {
     pub shape: u32,
     /// `None` for an interface, which shadow rays ignore.
     pub material: Option<Arc<Material>>,
+    /// The same for all surfaces that have this material.
+    pub material_id: MaterialId,
     pub emission: Option<Emission>,
     /// The light that samples it; `None` if only rays that hit it find its light.
     pub light: Option<LightId>,

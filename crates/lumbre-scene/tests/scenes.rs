@@ -16,7 +16,7 @@ use lumbre_scene::{
     Footprint, GeometryDesc, InstanceDesc, LightDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc,
     ObjectId, Scene, SceneDesc, ShapeDesc,
 };
-use lumbre_shading::{FloatTexture, Material, Texture};
+use lumbre_shading::{FloatTexture, Material, Spectrum, Texture};
 
 fn shape(index: u32, geometry: GeometryDesc) -> ShapeDesc {
     ShapeDesc {
@@ -622,4 +622,21 @@ fn cameras_see_through_one_sided_backs_and_light_does_not() {
         }
     }
     assert_eq!(count, 6);
+}
+
+#[test]
+fn one_material_under_several_names_has_one_number() {
+    let [paint, glass] = [0.2, 0.8].map(|grey| Arc::new(Material::diffuse(Spectrum::splat(grey))));
+    let named = |material: &Arc<Material>| NamedMaterial { name: None, material: material.clone() };
+    let ball = |number: u32| ShapeDesc {
+        material: Some(MaterialId(number)),
+        world_from_object: Transform::translate(DVec3::X * f64::from(number)),
+        ..shape(number, exact(Sphere::new(DVec3::ZERO, 0.25).unwrap()))
+    };
+    let materials = vec![named(&paint), named(&glass), named(&paint)];
+    let scene =
+        Scene::build(SceneDesc { shapes: (0..3).map(ball).collect(), materials, ..SceneDesc::default() });
+    let scene = scene.unwrap();
+    let ids = [0.0, 1.0, 2.0].map(|x| meet(&scene, &down(x, 0.0)).material_id);
+    assert_eq!(ids, [0, 1, 0].map(MaterialId));
 }

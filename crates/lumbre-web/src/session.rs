@@ -8,10 +8,10 @@ use lumbre::description::IntegratorKind;
 use lumbre::formats::{HeldFiles, Limits};
 use lumbre::image::unit_to_u8;
 use lumbre::{
-    CancelToken, DVec3, NoProgress, Picture, PixelBounds, Ray, ReadOptions, RenderOptions, RenderState,
-    SaveOptions, Scene,
+    CancelToken, DVec3, NoProgress, Picture, PixelBounds, Prepared, Ray, ReadOptions, RenderOptions,
+    RenderState, SaveOptions, Scene, Stage,
 };
-use lumbre_cli::{Defaults, Format, Language, Query, Request, SceneNames};
+use lumbre_cli::{Format, Language, Query, Request, SceneNames};
 use serde::{Deserialize, Serialize};
 
 use crate::problem::{Problem, ProblemKind};
@@ -89,7 +89,7 @@ pub struct Session {
     things: SceneNames,
     name: PathBuf,
     options: RenderOptions,
-    defaults: Defaults,
+    prepared: Prepared,
     save: SaveOptions,
     warnings: Vec<String>,
     state: Option<RenderState>,
@@ -119,26 +119,19 @@ impl Session {
                 )
             })?),
         };
-        let defaults = Defaults::stage(&mut desc, wanted.size, kind);
+        let mut stage = Stage::default();
+        stage.size = wanted.size;
+        let prepared = lumbre::prepare(&mut desc, &stage, kind);
         let needed = lumbre::predicted_build_bytes(&desc).saturating_add(diagnostics.memory_held());
         if needed > MEMORY {
             let what = format!("the scene needs {needed} bytes, a page has {MEMORY}");
             return Err(Problem::new(ProblemKind::Limit, what));
         }
         let scene = Scene::of_file(desc, &name, &mut diagnostics)?;
-        let mut options = scene.options();
-        options.integrator.kind = kind.unwrap_or(options.integrator.kind);
-        options.spectral &= options.integrator.kind.carries_wavelengths();
-        if let Some((width, height)) = wanted.size {
-            options.resize(scene.resolved().film(), width, height);
-        }
+        let mut options = prepared.options(&scene, kind, wanted.size);
         options.sampler.seed = wanted.seed.unwrap_or(options.sampler.seed);
-        options.transparent = defaults.background().is_some();
-        options.guides = defaults.denoises();
         options.threads = 1;
-        if let Some(spp) = wanted.spp.or(defaults.spp(&scene)) {
-            options.stop.spp = spp;
-        }
+        options.stop.spp = wanted.spp.unwrap_or(options.stop.spp);
         let pixels = u64::from(options.width) * u64::from(options.height);
         if pixels > PIXELS {
             let what = format!("the picture has {pixels} pixels, a page shows up to {PIXELS}");
@@ -146,15 +139,14 @@ impl Session {
         }
         // Refused here, and not by the first pass.
         options.bounds().map_err(lumbre::Error::from)?;
-        let mut save = SaveOptions::default();
-        save.tone_map = defaults.tone_map();
-        save.exposure = defaults.exposure(&scene, &options)?;
+        let mut save = prepared.save_options(&scene);
+        save.exposure = prepared.exposure(&scene, &options)?;
         let mut warnings = diagnostics.lines();
         if scene.is_dark() && options.integrator.kind.needs_light() {
             let dark = "the scene has no light: its picture is black";
             warnings.push(format!("warning: {}: {dark}", name.display()));
         }
-        Ok(Self { scene, things, name, options, defaults, save, warnings, state: None, picture: None })
+        Ok(Self { scene, things, name, options, prepared, save, warnings, state: None, picture: None })
     }
 
     /// What reading and building warned of, a line each.
@@ -210,7 +202,7 @@ impl Session {
         if is_done && self.options.guides {
             picture.denoise(self.options.threads)?;
         }
-        if let Some(background) = self.defaults.background() {
+        if let Some(background) = self.prepared.background() {
             picture = picture.over(background);
         }
         self.picture = Some(picture);

@@ -12,9 +12,9 @@
 //!     let turns = Some(f64::from(frame) / 36.0);
 //!     let mut stage = Stage::default();
 //!     (stage.turns, stage.ground) = (turns, Ground::Shadow);
-//!     stage.set(&mut desc);
+//!     let prepared = lumbre::prepare(&mut desc, &stage, None);
 //!     let scene = Scene::from_description(desc)?;
-//!     let mut options = scene.options();
+//!     let mut options = prepared.options(&scene, None, None);
 //!     options.transparent = true;
 //!     let paper = Background::Colour(lumbre::image::Rgb::WHITE);
 //!     scene.render(&options)?.over(paper).save(format!("frame.{frame:04}.png"))?;
@@ -36,6 +36,7 @@ mod info;
 mod parameter;
 mod part;
 mod picture;
+mod prepare;
 mod scene;
 mod setting;
 mod words;
@@ -74,6 +75,7 @@ pub mod journal {
 pub use parameter::{Parameter, ParameterKind, parameters};
 pub use part::{Job, Part, PartError};
 pub use picture::Picture;
+pub use prepare::{Prepared, prepare};
 pub use scene::{Scene, describe, open, open_with};
 pub use setting::Setting;
 pub use words::in_words;

@@ -303,8 +303,8 @@ impl<'s> LightTracer<'s> {
             let Some(part) = self.bounce(&mut path, &vertex, lobe, survival) else { return };
             if part.crosses {
                 match vertex.material.interior_medium(&here.at) {
-                    Some(medium) if here.front => path.interiors.enter(vertex.material, medium),
-                    _ => path.interiors.cross(vertex.material, here.front),
+                    Some(medium) if here.front => path.interiors.enter(vertex.solid(), medium),
+                    _ => path.interiors.cross(vertex.solid(), here.front),
                 }
             }
             path.medium = of_column(

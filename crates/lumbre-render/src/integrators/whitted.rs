@@ -11,7 +11,8 @@ use crate::transport::journal::{Event, Met, SampledLight, Scattered, Source};
 use crate::transport::through::ray_length;
 use crate::transport::{Record, SampleNumbers, Sampler};
 use crate::wave::PrimaryHits;
-use crate::wave::trees::{Branch, TreeIntegrator, TreeVertex, rounded};
+use crate::wave::paths::rounded;
+use crate::wave::trees::{Branch, TreeIntegrator, TreeVertex};
 
 /// Follows every mirror image and every refraction, and gives each surface on the way direct light from every light.
 ///
@@ -73,7 +74,7 @@ impl Whitted {
                 }
                 let mut interiors = came.interiors.clone();
                 if part.crosses {
-                    interiors.cross(vertex.material, here.front);
+                    interiors.cross(vertex.solid(), here.front);
                 }
                 let ray = rounded(vertex.leave(&part));
                 record.note(|| Event::Scattered(Scattered::of(&ray, &part, throughput)));

@@ -8,7 +8,7 @@ use lumbre_scene::{Interaction, LightSample, Scene};
 use lumbre_shading::{Bsdf, LocalDir, Material, Scatter, ShadingFrame, ShadingNormals, Spectrum};
 
 use crate::transport::Record;
-use crate::transport::interior::MediumStack;
+use crate::transport::interior::{MediumStack, Solid};
 use crate::transport::through::straight_on;
 
 /// A surface as seen along a path, ready to scatter.
@@ -94,7 +94,7 @@ impl<'a, 's> Vertex<'a, 's> {
         let towards = met.towards_origin.as_vec3();
         let (frame, mut bsdf) = material.shading(&met.at, &met.shading, towards, normals)?;
         if material.is_solid() {
-            let outside = interiors.index_outside(material, met.front);
+            let outside = interiors.index_outside(Solid::new(met, material), met.front);
             if outside != 1.0 {
                 bsdf = bsdf.immersed(outside);
             }
@@ -109,6 +109,11 @@ impl<'a, 's> Vertex<'a, 's> {
         };
         let terminator_origin = OnceCell::new();
         Some(Self { met, bsdf, material, frame, wo, geometric, side, scene, terminator_origin })
+    }
+
+    /// The solid whose surface it is on.
+    pub(crate) fn solid(&self) -> Solid<'s> {
+        Solid::new(self.met, self.material)
     }
 
     /// Whether the BSDF reflects to a direction.
@@ -278,7 +283,7 @@ impl<'a, 's> Vertex<'a, 's> {
     fn around(&self, crosses: bool, interiors: &MediumStack<'s>) -> MediumStack<'s> {
         let mut interiors = interiors.clone();
         if crosses {
-            interiors.cross(self.material, self.met.front);
+            interiors.cross(self.solid(), self.met.front);
         }
         interiors
     }

@@ -1,40 +1,56 @@
 //! The solids that a path is inside of.
 
 use lumbre_math::Elementary;
-use lumbre_scene::Interaction;
+use lumbre_scene::{Interaction, MaterialId};
 use lumbre_shading::spectrum::{SpectralLookup, Wavelengths};
 use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use smallvec::SmallVec;
 
 /// The solids around a point of a path, the innermost last: entered and not yet left.
 ///
-/// Solids are identified by their materials, so that one made of several meshes may be entered by one and left by
-/// another. Only the innermost medium applies. At its surface, its index of refraction is relative to that of the solid
+/// Solids are identified by the materials of their surfaces, so that one made of several meshes may be entered by one
+/// and left by another. Only the innermost medium applies. At its surface, its index of refraction is relative to that of the solid
 /// around it. If solids overlap without one containing the other, the one that was entered last counts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MediumStack<'s> {
-    around: SmallVec<[Solid<'s>; 2]>,
+    around: SmallVec<[Entered<'s>; 2]>,
     /// The wavelengths of the channels, unless these are linear Rec. 709.
     wavelengths: Option<Wavelengths>,
 }
 
+/// A solid, at a surface of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Solid<'s> {
+    /// The material of the surface, which all surfaces of the solid have.
+    pub(crate) id: MaterialId,
+    /// Which of its materials this is, if it is a mixture.
+    pub(crate) material: &'s Material,
+}
+
+impl<'s> Solid<'s> {
+    /// The solid of a surface whose material resolves to this one.
+    pub(crate) fn new(here: &Interaction<'s>, material: &'s Material) -> Self {
+        Self { id: here.material_id, material }
+    }
+}
+
 /// A solid around a point.
 #[derive(Clone, Copy, Debug)]
-struct Solid<'s> {
-    material: &'s Material,
+struct Entered<'s> {
+    solid: Solid<'s>,
     /// The scattering medium, as it was where the path entered.
     medium: Option<HomogeneousMedium>,
 }
 
-impl<'s> Solid<'s> {
-    fn is_of(&self, material: &Material) -> bool {
-        std::ptr::eq(self.material, material)
+impl Entered<'_> {
+    fn is(&self, solid: Solid<'_>) -> bool {
+        self.solid.id == solid.id
     }
 
     /// σ of the law of Beer and Lambert.
     fn attenuation(&self, wavelengths: Option<&Wavelengths>) -> Option<Spectrum> {
         let of_medium = self.medium.map(|medium| medium.extinction);
-        of_medium.or_else(|| self.material.interior_attenuation(wavelengths))
+        of_medium.or_else(|| self.solid.material.interior_attenuation(wavelengths))
     }
 }
 
@@ -53,9 +69,10 @@ impl<'s> MediumStack<'s> {
     /// start of the path; before that, it is unknown.
     pub(crate) fn arrive(&mut self, here: &Interaction<'s>, material: Option<&'s Material>) {
         if let Some(material) = material.filter(|material| !here.front && material.is_solid())
-            && !self.around.iter().any(|solid| solid.is_of(material))
+            && !self.around.iter().any(|around| around.solid.id == here.material_id)
         {
-            self.around.insert(0, Solid { material, medium: material.interior_medium(&here.at) });
+            let solid = Solid::new(here, material);
+            self.around.insert(0, Entered { solid, medium: material.interior_medium(&here.at) });
         }
     }
 
@@ -83,42 +100,42 @@ impl<'s> MediumStack<'s> {
     }
 
     /// Crosses a surface, into the solid behind it or out of it.
-    pub(crate) fn cross(&mut self, material: &'s Material, inwards: bool) {
-        if !material.is_solid() {
+    pub(crate) fn cross(&mut self, solid: Solid<'s>, inwards: bool) {
+        if !solid.material.is_solid() {
             return;
         }
         if inwards {
-            self.push(material, None);
-        } else if let Some(place) = self.around.iter().rposition(|solid| solid.is_of(material)) {
+            self.push(solid, None);
+        } else if let Some(place) = self.around.iter().rposition(|around| around.is(solid)) {
             self.around.remove(place);
         }
     }
 
     /// Crosses a surface into a solid with this scattering medium.
-    pub(crate) fn enter(&mut self, material: &'s Material, medium: HomogeneousMedium) {
-        self.push(material, Some(medium));
+    pub(crate) fn enter(&mut self, solid: Solid<'s>, medium: HomogeneousMedium) {
+        self.push(solid, Some(medium));
     }
 
-    fn push(&mut self, material: &'s Material, medium: Option<HomogeneousMedium>) {
+    fn push(&mut self, solid: Solid<'s>, medium: Option<HomogeneousMedium>) {
         // Open meshes may be entered repeatedly and never left.
         if self.around.len() < 64 {
-            self.around.push(Solid { material, medium });
+            self.around.push(Entered { solid, medium });
         }
     }
 
     /// The index of refraction outside a solid whose surface the path is at.
-    pub(crate) fn index_outside(&self, material: &Material, from_outside: bool) -> f32 {
+    pub(crate) fn index_outside(&self, solid: Solid<'_>, from_outside: bool) -> f32 {
         let mut outer = self.around.iter().rev();
-        let solid = if from_outside {
+        let around = if from_outside {
             outer.next()
         } else {
             let mut is_left = false;
-            outer.find(|solid| {
-                let this = !is_left && solid.is_of(material);
+            outer.find(|around| {
+                let this = !is_left && around.is(solid);
                 is_left |= this;
                 !this
             })
         };
-        solid.and_then(|solid| solid.material.interior_index()).unwrap_or(1.0)
+        around.and_then(|around| around.solid.material.interior_index()).unwrap_or(1.0)
     }
 }

@@ -6,7 +6,7 @@ use lumbre_shading::spectrum::Wavelengths;
 use lumbre_shading::{Material, Scatter, ShadingNormals, Spectrum};
 
 use crate::transport::direct::Vertex;
-use crate::transport::interior::MediumStack;
+use crate::transport::interior::{MediumStack, Solid};
 use crate::transport::{Record, SampleNumbers};
 
 /// Maximum surfaces that refract or reflect light inside a solid.
@@ -77,7 +77,7 @@ pub(crate) fn light_through(
         }
         if bounce.transmitted {
             index *= bounce.eta;
-            interiors.cross(vertex.material, here.front);
+            interiors.cross(vertex.solid(), here.front);
         }
         ray = vertex.leave(&bounce);
     }
@@ -140,7 +140,7 @@ pub(crate) fn straight_on<'s>(
             left = hero_alone(left);
         }
         if let Some(material) = material {
-            interiors.cross(material, pane.front);
+            interiors.cross(Solid::new(&pane, material), pane.front);
         }
         ray = pane.shadow_ray(sample);
     }

@@ -164,6 +164,12 @@ fn fill<T: Clone>(column: &mut Vec<T>, len: usize, value: T) {
     column.resize(len, value);
 }
 
+/// A ray with the direction that a path has: in single precision. All facts of the ray are those of the rounded one.
+pub(crate) fn rounded(mut ray: Ray) -> Ray {
+    ray.direction = ray.direction.as_vec3().as_dvec3();
+    ray
+}
+
 /// The active paths, each with its next ray.
 #[derive(Debug, Default)]
 pub(crate) struct Paths {

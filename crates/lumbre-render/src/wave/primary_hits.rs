@@ -11,7 +11,7 @@ use crate::caustics::Merging;
 use crate::transport::{PrimaryHit, Record, SampleNumbers, Sampler, Seen};
 use crate::wave::camera::{AimNumbers, PinholeRays};
 use crate::wave::catcher::{Catcher, Places};
-use crate::wave::paths::{Paths, SampleId, Slots};
+use crate::wave::paths::{Paths, SampleId, Slots, rounded};
 use crate::wave::setting::Setting;
 use crate::wave::trees::TreeIntegrator;
 use crate::wave::{Precision, Wave};
@@ -89,12 +89,10 @@ impl<'a, 's> PrimaryHits<'a, 's> {
 
     /// Sets the camera ray of a sample. Earlier samples must have theirs.
     pub(crate) fn set_ray(&mut self, slot: usize, camera: &CameraRay) {
-        let CameraRay { mut ray, footprint, .. } = *camera;
-        // Paths store directions in single precision, so all facts of the ray use the rounded direction.
-        let direction = ray.direction.as_vec3();
-        ray.direction = direction.as_dvec3();
+        let CameraRay { ray, footprint, .. } = *camera;
+        let ray = rounded(ray);
         let Wave { slots, paths, .. } = &mut *self.wave;
-        paths.set_ray(slot, ray.origin, direction, cone(&CameraRay { ray, ..*camera }));
+        paths.set_ray(slot, ray.origin, ray.direction.as_vec3(), cone(&CameraRay { ray, ..*camera }));
         slots.time[slot] = ray.time;
         slots.footprints.push(footprint);
     }

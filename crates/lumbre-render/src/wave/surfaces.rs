@@ -10,7 +10,7 @@ use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
 use lumbre_simd::{UInt, V3};
 
 use crate::transport::Record;
-use crate::transport::interior::MediumStack;
+use crate::transport::interior::{MediumStack, Solid};
 use crate::transport::journal::{End, Event, Met, Source};
 use crate::transport::through::hero_alone;
 use crate::wave::Wave;
@@ -234,7 +234,7 @@ impl<'s> Wave<'s> {
             return;
         };
         if setting.has_solids && material.is_solid() {
-            let outside = self.slots.interiors[slot].index_outside(material, here.front);
+            let outside = self.slots.interiors[slot].index_outside(Solid::new(here, material), here.front);
             if outside != 1.0 {
                 bsdf = bsdf.immersed(outside);
             }
@@ -265,7 +265,7 @@ impl<'s> Wave<'s> {
         }
         if material.is_solid() {
             let inside = if here.front { material.interior_medium(&here.at) } else { None };
-            self.vertices.put_solid(material, here.front, inside);
+            self.vertices.put_solid(Solid::new(here, material), here.front, inside);
         }
         self.vertices.put_bsdf(&frame, &bsdf, flags, self.cone_at(path, here));
     }

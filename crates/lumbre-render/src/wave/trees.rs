@@ -36,7 +36,7 @@ pub(crate) trait TreeIntegrator {
 /// A ray of a tree.
 #[derive(Debug)]
 pub(crate) struct Branch<'s> {
-    /// With a direction in single precision: see [`rounded`].
+    /// With a direction in single precision: see [`crate::wave::paths::rounded`].
     pub(crate) ray: Ray,
     pub(crate) footprint: Footprint,
     /// The solids around its origin.
@@ -45,12 +45,6 @@ pub(crate) struct Branch<'s> {
     pub(crate) depth: u32,
     /// The number of the vertex at its end, in the order of visits.
     pub(crate) vertex: u32,
-}
-
-/// A ray with its direction rounded, as a wave stores it.
-pub(crate) fn rounded(mut ray: Ray) -> Ray {
-    ray.direction = ray.direction.as_vec3().as_dvec3();
-    ray
 }
 
 /// The tree of a sample, of which rays are left.

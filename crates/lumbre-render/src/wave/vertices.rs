@@ -3,9 +3,10 @@
 use lumbre_geometry::Surface;
 use lumbre_math::{DVec3, Vec3};
 use lumbre_shading::lanes::{BsdfKind, Rows};
-use lumbre_shading::{Bsdf, HomogeneousMedium, Material, ShadingFrame};
+use lumbre_shading::{Bsdf, HomogeneousMedium, ShadingFrame};
 use lumbre_simd::{Double, Real, V3};
 
+use crate::transport::interior::Solid;
 use crate::wave::paths::grow;
 
 /// Vertices of paths.
@@ -34,7 +35,7 @@ pub(crate) struct Vertices<'s> {
     /// The vertices to shade, by the kind of their BSDF.
     pub(crate) queues: [Vec<u32>; BsdfKind::COUNT],
     /// The solids of the surfaces, and whether they were met from outside; shorter lists mean none.
-    pub(crate) solids: Vec<Option<(&'s Material, bool)>>,
+    pub(crate) solids: Vec<Option<(Solid<'s>, bool)>>,
     /// The media that light enters there, if a solid has one; shorter lists mean none.
     inside: Vec<Option<HomogeneousMedium>>,
     /// The media where the path comes from and behind the surface, as [`crate::wave::paths::of_column`] reads them;
@@ -172,7 +173,7 @@ impl<'s> Vertices<'s> {
     }
 
     /// The solid of a vertex, and whether it was met from outside.
-    pub(crate) fn solid(&self, vertex: usize) -> Option<(&'s Material, bool)> {
+    pub(crate) fn solid(&self, vertex: usize) -> Option<(Solid<'s>, bool)> {
         self.solids.get(vertex).copied().flatten()
     }
 
@@ -182,7 +183,7 @@ impl<'s> Vertices<'s> {
     }
 
     /// Sets the solid of the last vertex, and the medium inside.
-    pub(crate) fn put_solid(&mut self, solid: &'s Material, front: bool, inside: Option<HomogeneousMedium>) {
+    pub(crate) fn put_solid(&mut self, solid: Solid<'s>, front: bool, inside: Option<HomogeneousMedium>) {
         self.solids.resize(self.len, None);
         self.solids[self.len - 1] = Some((solid, front));
         if inside.is_some() {
