@@ -153,7 +153,7 @@ impl Session {
             state: watch::channel("".into()).0,
             progress: watch::channel("".into()).0,
         };
-        session.tell(&session.lock());
+        session.publish_state(&session.lock());
         session
     }
 

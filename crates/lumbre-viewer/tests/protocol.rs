@@ -74,7 +74,11 @@ fn doc(attributes: &[Attribute], indent: &str, out: &mut String) {
             continue;
         };
         let Lit::Str(text) = &text.lit else { continue };
-        lines.push(text.value().trim().replace("\\[", "[").replace("\\]", "]").replace("crate::", ""));
+        let mut line = text.value().trim().to_owned();
+        for (rust, page) in [("\\[", "["), ("\\]", "]"), ("crate::", ""), ("`None`", "`null`")] {
+            line = line.replace(rust, page);
+        }
+        lines.push(line);
     }
     let space = format!("\n{indent} * ");
     match &lines[..] {
@@ -191,6 +195,15 @@ fn the_page_has_the_types_of_the_viewers_messages() {
 }
 
 #[test]
+fn the_page_knows_the_header_of_a_frame() {
+    let [rust, page] = ["src/frame.rs", "web/src/frame.ts"]
+        .map(|file| std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).unwrap());
+    assert!(rust.contains("HEADER: usize = 40;") && page.contains("HEADER = 40;"));
+    let magic = format!("MAGIC = {:#x};", u32::from_le_bytes(*b"LUM2"));
+    assert!(rust.contains("from_le_bytes(*b\"LUM2\");") && page.contains(&magic), "{magic}");
+}
+
+#[test]
 fn each_change_of_a_message_changes_the_pages_types() {
     let before = typescript(RUST);
     for (old, new) in [
@@ -200,7 +213,7 @@ fn each_change_of_a_message_changes_the_pages_types() {
         ("    pub zoom: f64,\n", "    pub magnification: f64,\n"),
         ("sequence: u32, camera: usize }", "sequence: f64, camera: usize }"),
         ("sequence: u32, camera: usize }", "camera: usize }"),
-        ("    Wrong { what: String },\n", ""),
+        ("    /// Why the page's message was refused.\n    Wrong { what: String },\n", ""),
         ("    Ids,\n", "    Ids,\n    Primitives,\n"),
         ("    #[serde(flatten)]\n", ""),
         ("#[serde(tag = \"for\"", "#[serde(tag = \"purpose\""),
