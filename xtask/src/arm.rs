@@ -25,8 +25,8 @@ pub(crate) fn test() -> Result<()> {
     }
 }
 
-/// All tests of all that a picture is made of, but for those of millions of rays; and the program beside this machine's, by
-/// `cargo xtask bytes`.
+/// All tests of all that a picture is made of, but for those of millions of rays; and the program beside this
+/// machine's, by `cargo xtask bytes`.
 pub(crate) fn test_all() -> Result<()> {
     let (Some(mut tests), Some(mut program)) = (cargo("test"), cargo("build")) else { return Ok(()) };
     let packages = PACKAGES.iter().flat_map(|package| ["--package", package]);

@@ -166,7 +166,7 @@ fn every_mode_makes_the_triangles_that_the_specification_says() {
 }
 
 #[test]
-fn points_and_lines_are_spheres_and_cylinders() {
+fn points_are_read_as_spheres_and_lines_as_cylinders() {
     let spheres = |scene: &SceneDesc| {
         let is = |s: &&ShapeDesc| matches!(&s.geometry, GeometryDesc::Exact(exact) if matches!(*exact, Shape::Sphere(_)));
         scene.shapes.iter().filter(is).count()
@@ -299,7 +299,7 @@ fn colour_of_default_surface() -> Rgb {
 }
 
 #[test]
-fn images_of_the_wrong_declared_type_are_read_with_a_note() {
+fn images_with_a_wrong_declared_type_are_read_with_a_warning() {
     let image = picture([51, 102, 204], image::ImageFormat::Png);
     let escaped: String = image.iter().map(|byte| format!("%{byte:02x}")).collect();
     let said = |image: &str| {
@@ -332,7 +332,7 @@ fn images_of_the_wrong_declared_type_are_read_with_a_note() {
 }
 
 #[test]
-fn interleaved_and_strided_vertices_are_told_apart() {
+fn interleaved_and_strided_vertices_are_read() {
     let mut binary = vec![];
     for (i, p) in SQUARE.iter().enumerate() {
         binary.extend(floats(p));
@@ -426,7 +426,7 @@ fn sparse_accessors_work_with_and_without_a_base() {
 }
 
 #[test]
-fn nodes_stand_where_their_parents_and_parts_say() {
+fn node_transforms_are_parent_times_translation_rotation_scale() {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
     // A quarter turn about z, then doubled along x, below a parent that moves.
@@ -451,7 +451,7 @@ fn nodes_stand_where_their_parents_and_parts_say() {
 }
 
 #[test]
-fn flattened_nodes_are_flat_and_vanished_ones_are_gone() {
+fn a_scale_of_0_flattens_along_one_axis_and_removes_along_more() {
     for (scale, shapes) in [("[1,1,0]", 1), ("[0,1,1]", 0), ("[0,0,0]", 0)] {
         let mut parts = Parts::default();
         let p = parts.positions(&SQUARE);
@@ -465,7 +465,7 @@ fn flattened_nodes_are_flat_and_vanished_ones_are_gone() {
 }
 
 #[test]
-fn nodes_may_hang_on_each_other_two_hundred_thousand_deep() {
+fn a_chain_of_200000_nodes_is_read_without_recursion() {
     let depth = 200_000;
     let nodes: Vec<String> =
         (1..depth).map(|i| format!(r#"{{"children":[{i}],"translation":[0,0,1]}}"#)).collect();
@@ -482,7 +482,7 @@ fn nodes_may_hang_on_each_other_two_hundred_thousand_deep() {
 }
 
 #[test]
-fn instancing_places_copies() {
+fn mesh_gpu_instancing_places_copies() {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
     let t = parts.add(
@@ -545,7 +545,7 @@ fn at_time(frame: Option<f64>) -> SceneDesc {
 }
 
 #[test]
-fn skins_and_morph_targets_stand_at_their_time() {
+fn skins_and_morph_targets_are_evaluated_at_the_frame_time() {
     let square = SQUARE.map(Vec3::from_array);
     // Weight of the morph target, and how far the second joint has come.
     for (frame, weight, far) in [
@@ -566,7 +566,7 @@ fn skins_and_morph_targets_stand_at_their_time() {
 }
 
 #[test]
-fn skins_and_morph_targets_are_seen_moving() {
+fn skins_and_morph_targets_have_motion_blur() {
     let (parts, rest) = animated();
     let options = changed(GltfOptions::default(), |it| {
         it.frame = Some(2.5);
@@ -597,7 +597,7 @@ fn skins_and_morph_targets_are_seen_moving() {
 }
 
 #[test]
-fn nodes_and_cameras_that_animations_move_are_seen_moving() {
+fn animated_nodes_and_cameras_have_motion_blur() {
     // A square that goes 8 along x from 1 s to 3 s, which hangs under one that does a whole turn about z meanwhile.
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
@@ -671,7 +671,7 @@ fn nodes_and_cameras_that_animations_move_are_seen_moving() {
 }
 
 #[test]
-fn rotations_take_the_shorter_way_and_splines_their_curve() {
+fn rotations_take_the_shorter_arc_and_splines_are_cubic() {
     let scene = at_time(Some(2.0));
     // A half of a quarter turn about z.
     let forward = scene.cameras[0].world_from_camera.vector(DVec3::X);
@@ -683,7 +683,7 @@ fn rotations_take_the_shorter_way_and_splines_their_curve() {
 }
 
 #[test]
-fn measured_lights_shine_as_their_profile_says_along_minus_z() {
+fn ies_lights_follow_their_profile_around_minus_z() {
     // 200 candelas straight ahead, none from 90 degrees on.
     let profile = "IES:LM-63-2019\nTILT=NONE\n1 -1 2 2 1 1 1 0 0 0 1 1 60\n0 90\n0\n100 0\n";
     let json = |profile: &str| {
@@ -721,7 +721,7 @@ fn measured_lights_shine_as_their_profile_says_along_minus_z() {
 }
 
 #[test]
-fn animations_by_pointers_change_what_they_name() {
+fn animation_pointers_change_the_property_they_name() {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
     let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
@@ -805,7 +805,7 @@ fn animations_by_pointers_change_what_they_name() {
 }
 
 #[test]
-fn one_animation_is_chosen_and_conflicting_ones_do_not_mix() {
+fn one_animation_is_chosen_and_conflicting_ones_are_left_out() {
     let mut parts = Parts::default();
     let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
     let moves = [8.0, 16.0].map(|far| {
@@ -888,7 +888,7 @@ fn by_pointers(rest: &str) -> String {
 }
 
 #[test]
-fn nodes_move_by_pointers_as_they_do_by_names() {
+fn animation_pointers_move_nodes_as_plain_targets_do() {
     let (parts, rest) = animated();
     let mut moving = 0;
     for (frame, shutter) in [(None, 0.0), (Some(1.5), 0.0), (Some(2.5), 2.0), (Some(2.0), 0.5)] {
@@ -911,7 +911,7 @@ fn nodes_move_by_pointers_as_they_do_by_names() {
 }
 
 #[test]
-fn single_weights_and_those_of_meshes_are_animated_by_pointers() {
+fn animation_pointers_change_single_weights_and_mesh_weights() {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
     let aside = parts.positions(&[[1.0, 0.0, 0.0]; 4]);
@@ -998,7 +998,7 @@ fn cameras_look_along_minus_z_and_are_not_mirrored() {
 }
 
 #[test]
-fn lights_that_animations_move_are_seen_moving() {
+fn animated_lights_have_motion_blur() {
     // A lamp that goes 8 along x from 1 s to 3 s, and a sun that turns by a quarter about z meanwhile, from +x to +y.
     let mut parts = Parts::default();
     let times = parts.add(&floats(&[1.0, 3.0]), r#""componentType":5126,"type":"SCALAR","count":2"#);
@@ -1062,7 +1062,7 @@ fn lights_that_animations_move_are_seen_moving() {
 }
 
 #[test]
-fn punctual_lights_keep_their_candelas_and_lux() {
+fn punctual_lights_are_in_candelas_and_lux() {
     let json = r#"{"asset":{"version":"2.0"},"extensionsUsed":["KHR_lights_punctual"],"extensions":{"KHR_lights_punctual":{"lights":[
         {"type":"point","color":[1,0.5,0.25],"intensity":40},{"type":"directional","intensity":3},
         {"type":"spot","intensity":7,"spot":{"innerConeAngle":0.2,"outerConeAngle":0.5}}]}},
@@ -1194,7 +1194,7 @@ fn set_of(texture: &FloatTexture) -> UvSet {
 }
 
 #[test]
-fn four_sets_of_texture_coordinates_serve_one_material() {
+fn one_material_can_use_four_sets_of_texture_coordinates() {
     let (scene, warnings) = with_sets(4, [0, 1, 2, 3, 3]);
     assert_eq!(warnings, [""; 0]);
     let mesh = mesh(&scene.shapes[0]);
@@ -1212,7 +1212,7 @@ fn four_sets_of_texture_coordinates_serve_one_material() {
 }
 
 #[test]
-fn texture_coordinate_sets_that_materials_use_are_kept() {
+fn only_texture_coordinate_sets_in_use_are_kept() {
     // Two of eight, one of them the last, take the room of two.
     let (scene, warnings) = with_sets(8, [7, 3, 7, 3, 7]);
     assert_eq!(warnings, [""; 0]);
@@ -1235,7 +1235,7 @@ fn texture_coordinate_sets_that_materials_use_are_kept() {
 }
 
 #[test]
-fn one_accessor_may_be_two_attributes_but_two_need_a_stride() {
+fn attributes_that_share_a_buffer_view_need_a_stride() {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
     let uv = parts.add(&floats(&[0.0; 16]), r#""componentType":5126,"type":"VEC2","count":4"#);
@@ -1253,7 +1253,7 @@ fn one_accessor_may_be_two_attributes_but_two_need_a_stride() {
 }
 
 #[test]
-fn every_parameter_of_a_material_arrives() {
+fn every_material_parameter_is_read() {
     let with = |name: &str, rest: &str| {
         principled(&format!(r#"{{"extensions":{{"KHR_materials_{name}":{{{rest}}}}}}}"#))
     };
@@ -1329,7 +1329,7 @@ fn every_parameter_of_a_material_arrives() {
 }
 
 #[test]
-fn unlit_shines_and_solids_scatter_inside() {
+fn unlit_emits_and_volume_scatter_is_a_medium() {
     let (scene, _) = dressed(
         r#"{"extensions":{"KHR_materials_unlit":{}},"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.25,1,1]}}"#,
     );
@@ -1346,7 +1346,7 @@ fn unlit_shines_and_solids_scatter_inside() {
 }
 
 #[test]
-fn missing_tangents_are_made_and_given_ones_are_kept() {
+fn missing_tangents_are_computed_and_given_ones_are_kept() {
     let material = r#""images":[{"uri":"data:image/png;base64,iVBORw0KGgo="}],"textures":[{"source":0}]"#;
     let square = |attributes: &[&str], material: &str| {
         let mut parts = Parts::default();
@@ -1406,7 +1406,7 @@ fn missing_tangents_are_made_and_given_ones_are_kept() {
 }
 
 #[test]
-fn coverage_is_by_mode_and_light_by_strength() {
+fn alpha_mode_sets_coverage_and_strength_scales_emission() {
     let with = |material: &str| {
         let mut parts = Parts::default();
         let p = parts.positions(&SQUARE);
@@ -1445,7 +1445,7 @@ fn coverage_is_by_mode_and_light_by_strength() {
 }
 
 #[test]
-fn what_is_invisible_everywhere_does_not_shine() {
+fn an_entirely_invisible_surface_emits_nothing() {
     let is_emissive = |alpha: f32, rest: &str| {
         let colour = format!(r#""pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,{alpha}]}}"#);
         let (scene, _) = dressed(&format!(r#"{{{colour},"emissiveFactor":[1,1,1]{rest}}}"#));
@@ -1468,7 +1468,7 @@ fn what_is_invisible_everywhere_does_not_shine() {
 }
 
 #[test]
-fn variants_are_worn_by_name() {
+fn a_material_variant_is_chosen_by_name() {
     let mut parts = Parts::default();
     let p = parts.positions(&SQUARE);
     let rest = format!(
@@ -1492,7 +1492,7 @@ fn variants_are_worn_by_name() {
 }
 
 #[test]
-fn files_are_found_by_escaped_and_foreign_names() {
+fn files_are_found_by_percent_encoded_and_unicode_names() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("a b ü%.bin"), floats(SQUARE.as_flattened())).unwrap();
     for uri in ["a%20b%20%C3%BC%25.bin", "a b ü%25.bin", "./a b \\u00fc%.bin"] {
@@ -1509,7 +1509,7 @@ fn files_are_found_by_escaped_and_foreign_names() {
 }
 
 #[test]
-fn vertices_that_no_one_uses_are_left_out() {
+fn unused_vertices_are_left_out() {
     let mut parts = Parts::default();
     let many: Vec<[f32; 3]> = (0..5000).map(|i| [i as f32, (i % 7) as f32, 0.5]).collect();
     let (p, i) = (parts.positions(&many), parts.indices(&[4000, 17, 3000]));
@@ -1520,7 +1520,7 @@ fn vertices_that_no_one_uses_are_left_out() {
 }
 
 #[test]
-fn compressed_buffer_views_are_unpacked() {
+fn meshopt_compressed_buffer_views_are_decompressed() {
     // Eight triangles over nine vertices, by meshoptimizer.
     let packed: Vec<u8> = [
         0xE1, 0xFE, 0x1E, 0x10, 0x0E, 0x4E, 0x1E, 0x12, 0x0E, 0x0F, 0x06, 0x00, 0x76, 0x87, 0x56, 0x67, 0x78,
@@ -1572,7 +1572,7 @@ fn picture(colour: [u8; 3], format: image::ImageFormat) -> Vec<u8> {
 }
 
 #[test]
-fn an_image_of_an_extension_goes_before_the_plain_one() {
+fn an_extension_image_takes_precedence_over_the_plain_one() {
     let red = picture([255, 0, 0], image::ImageFormat::Png);
     let blue = picture([0, 0, 255], image::ImageFormat::WebP);
     let mut parts = Parts::default();
@@ -1613,7 +1613,7 @@ fn rich() -> (String, Vec<u8>) {
 }
 
 #[test]
-fn broken_files_are_refused_with_a_pointer_and_a_reason() {
+fn invalid_files_are_errors_with_a_json_pointer() {
     let (json, binary) = rich();
     read(&json, &binary);
     let length = binary.len();
@@ -1732,7 +1732,7 @@ fn bad_indices_and_nan_numbers_give_warnings() {
 }
 
 #[test]
-fn a_file_cut_anywhere_is_an_error() {
+fn a_file_truncated_anywhere_is_an_error() {
     let (json, binary) = rich();
     let whole = glb(&json, &binary);
     for cut in 0..whole.len() {
@@ -1860,7 +1860,7 @@ fn base64(text: &str) -> Vec<u8> {
 
 #[cfg(feature = "draco")]
 #[test]
-fn primitives_compressed_by_draco_are_the_mesh_that_they_were() {
+fn draco_primitives_decode_to_the_original_mesh() {
     let grid = grid();
     for packed in DRACO {
         let (json, data) = compressed_by_draco(&base64(packed), 36);
@@ -1902,7 +1902,7 @@ fn primitives_compressed_by_draco_are_the_mesh_that_they_were() {
 
 #[cfg(feature = "draco")]
 #[test]
-fn damaged_draco_is_an_error_with_a_pointer_and_costs_little() {
+fn damaged_draco_data_is_an_error_with_a_json_pointer() {
     let whole = base64(DRACO[1]);
     let (json, data) = compressed_by_draco(&whole, 33);
     let message = error(&json, &data);
@@ -1958,7 +1958,7 @@ fn ktx(colours: [[u8; 4]; 2]) -> Vec<u8> {
 
 #[cfg(feature = "basisu")]
 #[test]
-fn textures_in_basis_universal_are_read() {
+fn basis_universal_textures_are_read() {
     let colours = [[200, 100, 50, 255], [10, 20, 30, 128]];
     let whole = ktx(colours);
     let with = |texture: &[u8]| {

@@ -61,7 +61,7 @@ fn bounded(path: &Path) -> (Result<SceneDesc, String>, Duration, f64) {
 }
 
 #[test]
-fn malformed_files_are_refused_at_their_place_and_cost_little() {
+fn malformed_assets_are_errors_with_their_place() {
     let Some(folder) = shared("gltf/gltf-validator") else { return };
     let (mut refused, mut longest, mut largest) = (0, Duration::ZERO, 0.0_f64);
     for path in files_below(&folder, &[".gltf", ".glb"]) {
@@ -87,7 +87,7 @@ fn malformed_files_are_refused_at_their_place_and_cost_little() {
 }
 
 #[test]
-fn files_are_refused_as_by_the_validator() {
+fn assets_that_the_validator_refuses_are_errors() {
     let Some(folder) = shared("gltf/gltf-validator") else { return };
     let mut failures = vec![];
     let mut refused = 0;

@@ -9,7 +9,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use lumbre::formats::{SceneFormat, atomic_write};
-use serde::Deserialize;
+
+use crate::message::DroppedFile;
 
 /// What it begins with.
 const MAGIC: &[u8] = b"LUMF";
@@ -18,13 +19,6 @@ const MAX_FILES: usize = 4000;
 /// Bytes of a name, and folders in it.
 const MAX_NAME: usize = 400;
 const MAX_DEPTH: usize = 16;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Entry {
-    name: String,
-    size: u64,
-}
 
 /// Why files are not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,13 +68,13 @@ fn files(bytes: &[u8]) -> Result<Vec<(String, &[u8])>, Refused> {
     let (length, rest) = rest.split_at_checked(4).ok_or(Refused::Malformed)?;
     let length = u32::from_le_bytes([length[0], length[1], length[2], length[3]]) as usize;
     let (list, mut rest) = rest.split_at_checked(length).ok_or(Refused::Malformed)?;
-    let entries: Vec<Entry> = serde_json::from_slice(list).map_err(|_| Refused::Malformed)?;
+    let entries: Vec<DroppedFile> = serde_json::from_slice(list).map_err(|_| Refused::Malformed)?;
     if entries.is_empty() || entries.len() > MAX_FILES {
         return Err(Refused::Malformed);
     }
     let mut files = Vec::with_capacity(entries.len());
     let mut known = BTreeSet::new();
-    for Entry { name, size } in entries {
+    for DroppedFile { name, size } in entries {
         // Systems that know no case have one file for both.
         if !leads_inside(&name) || !known.insert(name.to_lowercase()) {
             return Err(Refused::Name);

@@ -3,18 +3,8 @@
 use lumbre::description::{Camera, CameraKind, SphericalMapping};
 use lumbre::math::DAffine3;
 use lumbre::{DVec3, Transform};
-use serde::{Deserialize, Serialize};
 
-/// A camera's position and orientation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Placement {
-    /// The camera's position.
-    pub eye: [f64; 3],
-    /// A point in the middle of the picture.
-    pub target: [f64; 3],
-    /// What is upwards in the picture.
-    pub up: [f64; 3],
-}
+use crate::message::Placement;
 
 /// Larger coordinates make no picture.
 const FARTHEST: f64 = 1e12;

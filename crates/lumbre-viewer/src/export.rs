@@ -13,10 +13,11 @@ use lumbre::formats::{atomic_write, open_regular};
 use lumbre::image::{Encoded, Image, f32_to_half};
 use lumbre::{CancelToken, ErrorKind, NoProgress, Stop};
 use rayon::prelude::*;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::base64::base64;
-use crate::frame::{Channel, Frame, HEADER, Look, Pixels, Shot};
+use crate::frame::{Frame, HEADER, Look, Pixels, Shot};
+use crate::message::{Channel, StaticChannel, StaticPage, StaticPicks, StaticProgress};
 use crate::page::FILES;
 use crate::source::{Built, Moment, Source, SourceError};
 use crate::stage::{Stage, ray};
@@ -59,7 +60,7 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
     };
     let png = picture.encode(ImageFormat::Png, &look.save, &[])?;
     let mut channels =
-        vec![json!({ "name": Channel::Beauty, "png": base64(&png), "values": base64(&values) })];
+        vec![StaticChannel { name: Channel::Beauty, png: base64(&png), values: base64(&values) }];
     for (channel, kind) in [
         (Channel::Albedo, IntegratorKind::Albedo),
         (Channel::Normal, IntegratorKind::Normals),
@@ -77,20 +78,26 @@ pub fn export(source: &dyn Source, folder: &Path, cancel: &CancelToken) -> Resul
         let pixels = Pixels::Rendered(Box::new(picture));
         let shot =
             Shot { pixels, channel, full, sequence: 0, is_full: true, is_done: true, is_denoised: false };
-        channels.push(json!({ "name": channel, "png": base64(&shown(&shot, &look)?), "values": values }));
+        channels.push(StaticChannel { name: channel, png: base64(&shown(&shot, &look)?), values });
     }
     let rays = stats.rays.camera + stats.rays.bounce + stats.rays.shadow;
     let seconds = stats.elapsed.as_secs_f64();
-    let data = json!({
-        "name": source.name(),
-        "scene": stage.facts,
-        "placement": stage.placements.get(options.camera),
-        "camera": options.camera,
-        "progress": { "spp": stats.spp, "target": options.stop.spp, "noise": stats.noise, "seconds": seconds,
-                      "rays_per_second": rays as f64 / seconds.max(1e-6) },
-        "channels": channels,
-        "picks": picks(&stage, options.camera, full)?,
-    });
+    let page = StaticPage {
+        name: source.name(),
+        scene: &stage.facts,
+        placement: stage.placements.get(options.camera).copied(),
+        camera: options.camera,
+        progress: StaticProgress {
+            spp: stats.spp,
+            target: options.stop.spp,
+            noise: stats.noise,
+            seconds,
+            rays_per_second: rays as f64 / seconds.max(1e-6),
+        },
+        channels,
+        picks: picks(&stage, options.camera, full)?,
+    };
+    let data = serde_json::to_value(&page).map_err(|e| wrong(ErrorKind::Options, e.to_string()))?;
     write(folder, &data)
 }
 
@@ -175,7 +182,7 @@ fn packed(image: &Image) -> Result<Vec<u8>, SourceError> {
 
 /// The hits of the rays through the pixels' middles: for each pixel the position of the shape in a list, counted from
 /// 1, or 0 for nothing, and its distance.
-fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Value, SourceError> {
+fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<StaticPicks, SourceError> {
     let scene = stage.scene();
     let pixels = (0..height).into_par_iter().flat_map_iter(|y| (0..width).map(move |x| (x, y)));
     let met = pixels.map(|(x, y)| {
@@ -190,8 +197,8 @@ fn picks(stage: &Stage, camera: usize, (width, height): (u32, u32)) -> Result<Va
         Some((shape, distance)) => [places[shape].to_le_bytes(), distance.to_le_bytes()],
         None => [[0; 4]; 2],
     });
-    let shapes = shapes.iter().map(|shape| stage.thing(*shape).told(*shape));
-    Ok(json!({ "shapes": shapes.collect::<Vec<_>>(), "values": base64(&compressed(numbers)?) }))
+    let shapes = shapes.iter().map(|shape| stage.thing(*shape).listed(*shape));
+    Ok(StaticPicks { shapes: shapes.collect(), values: base64(&compressed(numbers)?) })
 }
 
 /// Little-endian numbers, compressed.

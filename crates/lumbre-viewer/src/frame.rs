@@ -4,28 +4,8 @@ use hyper::body::Bytes;
 use lumbre::image::{Encoded, Image, Rgb, ToneMap, srgb_to_linear};
 use lumbre::{Picture, SaveOptions};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// The channel that is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Channel {
-    /// The picture.
-    #[default]
-    Beauty,
-    /// Reflectance.
-    Albedo,
-    /// Shading normals, (n + 1) / 2.
-    Normal,
-    /// Depth along the camera's axis.
-    Depth,
-    /// Texture coordinates.
-    Uv,
-    /// The variance of the picture's luminance; its square root, the standard error, is shown in false colours.
-    Variance,
-    /// A colour for each shape.
-    Ids,
-}
+use crate::message::{Channel, ColourMap};
 
 /// How a picture is shown.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +15,7 @@ pub(crate) struct Look {
     /// Luminance as colours, by stops.
     pub false_colour: bool,
     /// The colours of numbers.
-    pub map: Map,
+    pub map: ColourMap,
     /// The numbers at both ends of the colours; found where `None`.
     pub range: Option<[f32; 2]>,
 }
@@ -43,23 +23,8 @@ pub(crate) struct Look {
 impl Look {
     /// That of a picture, with the colours and the range of numbers that are found.
     pub(crate) fn of(save: SaveOptions) -> Self {
-        Self { save, false_colour: false, map: Map::default(), range: None }
+        Self { save, false_colour: false, map: ColourMap::default(), range: None }
     }
-}
-
-/// The colours of numbers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Map {
-    /// Grey for depth, the rainbow for light.
-    #[default]
-    Automatic,
-    /// Near is bright; of light, bright is bright.
-    Grey,
-    /// Dark blue, blue, green, yellow, red.
-    Rainbow,
-    /// Dark blue, green, yellow, at steps that look even (S. van der Walt and N. Smith, matplotlib's default of 2015).
-    Viridis,
 }
 
 /// A picture, with the data that a page needs.
@@ -235,7 +200,7 @@ fn scale_colour(scale: &[[f32; 3]], place: f32) -> [u8; 3] {
 }
 
 /// A colour for light, by stops: below the range is black, above it white. A range that begins at 0 or below is even.
-fn light_colour(light: f32, [low, high]: [f32; 2], map: Map) -> [u8; 3] {
+fn light_colour(light: f32, [low, high]: [f32; 2], map: ColourMap) -> [u8; 3] {
     let place = if low > 0.0 {
         (log2(light.max(1e-30)) - log2(low)) / (log2(high) - log2(low))
     } else {
@@ -249,19 +214,19 @@ fn light_colour(light: f32, [low, high]: [f32; 2], map: Map) -> [u8; 3] {
         return [255; 3];
     }
     match map {
-        Map::Grey => Encoded::new(place, place, place).to_u8(),
-        Map::Viridis => scale_colour(&VIRIDIS, place),
-        Map::Automatic | Map::Rainbow => scale_colour(&RAINBOW, place),
+        ColourMap::Grey => Encoded::new(place, place, place).to_u8(),
+        ColourMap::Viridis => scale_colour(&VIRIDIS, place),
+        ColourMap::Automatic | ColourMap::Rainbow => scale_colour(&RAINBOW, place),
     }
 }
 
 /// A colour for a depth: what is beyond the range has the colour of its end.
-fn depth_colour(depth: f32, [near, far]: [f32; 2], map: Map) -> [u8; 3] {
+fn depth_colour(depth: f32, [near, far]: [f32; 2], map: ColourMap) -> [u8; 3] {
     let place = ((depth - near) / (far - near)).clamp(0.0, 1.0);
     match map {
-        Map::Automatic | Map::Grey => Encoded::srgb(Rgb::splat(1.0 - 0.9 * place)).to_u8(),
-        Map::Rainbow => scale_colour(&RAINBOW, place),
-        Map::Viridis => scale_colour(&VIRIDIS, place),
+        ColourMap::Automatic | ColourMap::Grey => Encoded::srgb(Rgb::splat(1.0 - 0.9 * place)).to_u8(),
+        ColourMap::Rainbow => scale_colour(&RAINBOW, place),
+        ColourMap::Viridis => scale_colour(&VIRIDIS, place),
     }
 }
 
@@ -283,19 +248,25 @@ mod tests {
     #[test]
     fn false_colours_go_by_stops_and_mark_what_is_beyond() {
         let range = STOPS.map(|stops| MIDDLE_GREY * exp2(stops));
-        let colour = |light| light_colour(light, range, Map::Automatic);
+        let colour = |light| light_colour(light, range, ColourMap::Automatic);
         assert_eq!(colour(0.0), [0; 3]);
         assert_eq!(colour(100.0), [255; 3]);
         assert_eq!(colour(f32::NAN), [0; 3]);
         assert_eq!(colour(0.18), Encoded::new(0.25, 0.70, 0.30).to_u8());
         assert_ne!(colour(0.36), colour(0.18));
         // A range that begins at 0 is even, one above it by stops; the ends have the first and the last colour.
-        assert_eq!(light_colour(1.0, [0.0, 2.0], Map::Grey), [128; 3]);
-        assert_eq!(light_colour(1.0, [0.25, 4.0], Map::Grey), [128; 3]);
-        assert_eq!(light_colour(2.0, [0.0, 2.0], Map::Viridis), Encoded::new(0.993, 0.906, 0.144).to_u8());
-        assert_eq!(depth_colour(7.0, [3.0, 5.0], Map::Rainbow), Encoded::new(0.80, 0.05, 0.10).to_u8());
-        assert_eq!(depth_colour(3.0, [3.0, 5.0], Map::Viridis), Encoded::new(0.267, 0.005, 0.329).to_u8());
-        assert_eq!(depth_colour(3.0, [3.0, 5.0], Map::Automatic), [255; 3]);
+        assert_eq!(light_colour(1.0, [0.0, 2.0], ColourMap::Grey), [128; 3]);
+        assert_eq!(light_colour(1.0, [0.25, 4.0], ColourMap::Grey), [128; 3]);
+        assert_eq!(
+            light_colour(2.0, [0.0, 2.0], ColourMap::Viridis),
+            Encoded::new(0.993, 0.906, 0.144).to_u8()
+        );
+        assert_eq!(depth_colour(7.0, [3.0, 5.0], ColourMap::Rainbow), Encoded::new(0.80, 0.05, 0.10).to_u8());
+        assert_eq!(
+            depth_colour(3.0, [3.0, 5.0], ColourMap::Viridis),
+            Encoded::new(0.267, 0.005, 0.329).to_u8()
+        );
+        assert_eq!(depth_colour(3.0, [3.0, 5.0], ColourMap::Automatic), [255; 3]);
     }
 
     #[test]

@@ -16,9 +16,7 @@ use std::sync::{Mutex, PoisonError};
 use hyper::HeaderMap;
 use hyper::header::{HOST, HeaderName, ORIGIN};
 
-use serde::Serialize;
-
-use crate::message::Errand;
+use crate::message::{Access, Errand};
 
 /// Why a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,16 +36,6 @@ pub(crate) struct Welcome {
     pub session: Option<String>,
     /// What the page may do.
     pub access: Access,
-}
-
-/// What a page may do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Access {
-    /// All.
-    Edit,
-    /// Ask, and change nothing: see [`crate::message::Message::only_asks`].
-    Watch,
 }
 
 /// The secrets that let in one browser.

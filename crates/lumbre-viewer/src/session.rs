@@ -6,12 +6,13 @@ use std::time::Duration;
 
 use lumbre::image::ToneMap;
 use lumbre::{CancelToken, Stop};
-use serde_json::{Value, json};
 use tokio::sync::watch;
 
-use crate::camera::Placement;
-use crate::frame::{Channel, Frame, Look, Map, Pixels, Shot};
-use crate::message::{Message, Plane, SetOptions};
+use crate::frame::{Frame, Look, Pixels, Shot};
+use crate::message::{
+    Channel, ColourMap, PageMessage, PixelValue, Placement, Plane, RenderProgress, SetOptions, ViewerMessage,
+    ViewerState, to_json,
+};
 use crate::source::{Moment, Source};
 use crate::stage::{Explained, Stage};
 use crate::tree::{Hidden, MAX_NAMED};
@@ -51,7 +52,7 @@ pub(crate) struct Wanted {
     pub exposure: Option<f32>,
     pub tone_map: Option<ToneMap>,
     pub false_colour: bool,
-    pub map: Map,
+    pub map: ColourMap,
     pub range: Option<[f32; 2]>,
     pub hidden: Hidden,
     pub section: Option<Plane>,
@@ -123,7 +124,7 @@ impl Session {
             exposure: None,
             tone_map: None,
             false_colour: false,
-            map: Map::default(),
+            map: ColourMap::default(),
             range: None,
             hidden: Hidden::default(),
             section: None,
@@ -152,7 +153,7 @@ impl Session {
             state: watch::channel("".into()).0,
             progress: watch::channel("".into()).0,
         };
-        session.tell(&session.lock());
+        session.publish_state(&session.lock());
         session
     }
 
@@ -166,7 +167,7 @@ impl Session {
         change(&mut inner);
         inner.cancel.cancel();
         self.changed.notify_all();
-        self.tell(&inner);
+        self.publish_state(&inner);
     }
 
     /// Waits for a change of the requested state, or for work to continue; `None` when the viewer closes.
@@ -235,26 +236,26 @@ impl Session {
     }
 
     /// Publishes a stage, or why there is none; then the last one stays.
-    pub(crate) fn staged(&self, staged: Result<Arc<Stage>, String>) {
+    pub(crate) fn publish_stage(&self, staged: Result<Arc<Stage>, String>) {
         let mut inner = self.lock();
         match staged {
             Ok(stage) => {
-                let scene = json!({ "type": "scene", "scene": stage.facts });
+                let scene = to_json(&ViewerMessage::Scene { scene: &stage.facts });
                 (inner.stage, inner.error) = (Some(stage), None);
-                self.scene.send_replace(scene.to_string().into());
+                self.scene.send_replace(scene.into());
             }
             Err(error) => inner.error = Some(error),
         }
-        self.tell(&inner);
+        self.publish_state(&inner);
     }
 
     /// Publishes whether the requested picture can be rendered.
-    pub(crate) fn pictured(&self, pictured: Result<(), String>) {
+    pub(crate) fn publish_picture_error(&self, pictured: Result<(), String>) {
         let mut inner = self.lock();
         let error = pictured.err();
         if inner.picture_error != error {
             inner.picture_error = error;
-            self.tell(&inner);
+            self.publish_state(&inner);
         }
     }
 
@@ -277,10 +278,10 @@ impl Session {
     }
 
     /// Publishes whether the last parameter could be set.
-    pub(crate) fn edited(&self, wrong: Option<String>) {
+    pub(crate) fn publish_edit_error(&self, wrong: Option<String>) {
         let mut inner = self.lock();
         inner.edit_error = wrong;
-        self.tell(&inner);
+        self.publish_state(&inner);
     }
 
     /// Reverts a parameter that cannot be set.
@@ -303,56 +304,56 @@ impl Session {
         Some((inner.shot.clone()?, inner.look.clone()?))
     }
 
-    pub(crate) fn tell_progress(&self, progress: &Value) {
-        self.progress.send_replace(progress.to_string().into());
+    pub(crate) fn publish_progress(&self, progress: RenderProgress) {
+        self.progress.send_replace(to_json(&ViewerMessage::Progress(progress)).into());
     }
 
     /// Publishes the requested state and the scene.
-    fn tell(&self, inner: &Inner) {
+    fn publish_state(&self, inner: &Inner) {
         let Inner { wanted, stage, error, picture_error, edit_error, name, .. } = inner;
         let index =
             stage.as_ref().map_or(0, |stage| wanted.camera.min(stage.cameras.len().saturating_sub(1)));
         let own = stage.as_ref().and_then(|stage| stage.placements.get(index));
-        let size = stage.as_ref().map(|stage| [stage.options.width, stage.options.height]);
-        let state = json!({
-            "type": "state",
-            "name": name,
-            "has_scene": stage.is_some(),
-            "error": error.as_ref().or(picture_error.as_ref()),
-            "edit_error": edit_error,
-            "camera": index,
-            "sequence": wanted.sequence,
-            "moved": wanted.moved.is_some(),
-            "placement": wanted.moved.as_ref().map(|moved| &moved.placement).or(own),
-            "fov": wanted.moved.and_then(|moved| moved.fov),
-            "zoom": wanted.moved.map_or(1.0, |moved| moved.zoom),
-            "size": size,
-            "channel": wanted.channel,
-            "scale": wanted.scale,
-            "spp": wanted.spp.or(stage.as_ref().map(|stage| stage.options.stop.spp)),
-            "noise": wanted.noise.or(stage.as_ref().and_then(|stage| stage.options.stop.noise)),
-            "denoise": wanted.denoise.or(stage.as_ref().map(|stage| stage.denoise)),
-            "paused": wanted.paused,
-            "exposure": wanted.exposure.or(stage.as_ref().map(|stage| stage.save.exposure)),
-            "tone_map": wanted.tone_map.or(stage.as_ref().map(|stage| stage.save.tone_map)).map(tone_map_name),
-            "false_colour": wanted.false_colour,
-            "map": wanted.map,
-            "range": wanted.range,
-            "hidden": wanted.hidden.told(),
-            "section": wanted.section,
-            "time": wanted.moment.time,
-            "variant": wanted.moment.variant,
-            "settings": wanted.settings,
-        });
-        self.state.send_replace(state.to_string().into());
+        let options = stage.as_ref().map(|stage| &stage.options);
+        let save = stage.as_ref().map(|stage| &stage.save);
+        let state = ViewerState {
+            name: name.clone(),
+            has_scene: stage.is_some(),
+            error: error.as_ref().or(picture_error.as_ref()).cloned(),
+            edit_error: edit_error.clone(),
+            camera: index,
+            sequence: wanted.sequence,
+            moved: wanted.moved.is_some(),
+            placement: wanted.moved.map(|moved| moved.placement).or(own.copied()),
+            fov: wanted.moved.and_then(|moved| moved.fov),
+            zoom: wanted.moved.map_or(1.0, |moved| moved.zoom),
+            size: options.map(|options| [options.width, options.height]),
+            channel: wanted.channel,
+            scale: wanted.scale,
+            spp: wanted.spp.or(options.map(|options| options.stop.spp)),
+            noise: wanted.noise.or(options.and_then(|options| options.stop.noise)),
+            denoise: wanted.denoise.or(stage.as_ref().map(|stage| stage.denoise)),
+            paused: wanted.paused,
+            exposure: wanted.exposure.or(save.map(|save| save.exposure)),
+            tone_map: wanted.tone_map.or(save.map(|save| save.tone_map)).map(tone_map_name),
+            false_colour: wanted.false_colour,
+            map: wanted.map,
+            range: wanted.range,
+            hidden: wanted.hidden.listed(),
+            section: wanted.section,
+            time: wanted.moment.time,
+            variant: wanted.moment.variant.clone(),
+            settings: wanted.settings.clone(),
+        };
+        self.state.send_replace(to_json(&ViewerMessage::State(Box::new(state))).into());
     }
 
     /// Handles a page's message; returns the answer, if any.
-    pub(crate) fn obey(&self, message: Message) -> Option<Value> {
+    pub(crate) fn handle_message(&self, message: PageMessage) -> Option<ViewerMessage<'static>> {
         match message {
             // The socket handles these.
-            Message::Shown {} | Message::Ticket { .. } => None,
-            Message::Camera { sequence, placement, fov, zoom } => {
+            PageMessage::Shown {} | PageMessage::Ticket { .. } => None,
+            PageMessage::Camera { sequence, placement, fov, zoom } => {
                 self.change(|inner| {
                     let wanted = &mut inner.wanted;
                     wanted.sequence = sequence;
@@ -361,7 +362,7 @@ impl Session {
                 });
                 None
             }
-            Message::Reset { sequence, camera } => {
+            PageMessage::Reset { sequence, camera } => {
                 self.change(|inner| {
                     let wanted = &mut inner.wanted;
                     (wanted.sequence, wanted.camera, wanted.moved) = (sequence, camera, None);
@@ -369,26 +370,26 @@ impl Session {
                 });
                 None
             }
-            Message::Set(wishes) => self.wish(&wishes),
-            Message::Edit { path, value } => self.edit(path, value),
-            Message::Hide { shapes, .. } if shapes.len() > MAX_NAMED => {
-                Some(json!({ "type": "wrong", "what": format!("more than {MAX_NAMED} shapes are named") }))
+            PageMessage::Set(options) => self.set_options(&options),
+            PageMessage::Edit { path, value } => self.edit(path, value),
+            PageMessage::Hide { shapes, .. } if shapes.len() > MAX_NAMED => {
+                Some(ViewerMessage::wrong(format!("more than {MAX_NAMED} shapes are named")))
             }
-            Message::Hide { shapes, others } => {
+            PageMessage::Hide { shapes, others } => {
                 self.change(|inner| {
                     inner.wanted.hidden = Hidden::new(shapes, others);
                     inner.wanted.changes.build += 1;
                 });
                 None
             }
-            Message::Section { plane } => {
+            PageMessage::Section { plane } => {
                 self.change(|inner| {
                     inner.wanted.section = plane;
                     inner.wanted.changes.render += 1;
                 });
                 None
             }
-            Message::Moment { time, variant } => {
+            PageMessage::Moment { time, variant } => {
                 let is_fine = time.is_none_or(|time| time.is_finite() && time.abs() < 1e9);
                 if is_fine && variant.as_ref().is_none_or(|name| name.len() <= LONGEST_SETTING) {
                     self.change(|inner| {
@@ -398,36 +399,39 @@ impl Session {
                 }
                 None
             }
-            Message::Pick { x, y, request } => self.pick(x, y, request),
-            Message::Values { x, y, width, height, request } => self.values([x, y, width, height], request),
+            PageMessage::Pick { x, y, request } => self.pick(x, y, request),
+            PageMessage::Values { x, y, width, height, request } => {
+                self.values([x, y, width, height], request)
+            }
         }
     }
 
-    fn wish(&self, wishes: &SetOptions) -> Option<Value> {
-        let tone_map = match wishes.tone_map.as_deref().map(|name| ToneMap::from_name(name).ok_or(name)) {
-            Some(Err(_)) => return Some(json!({ "type": "wrong", "what": "there is no such tone mapping" })),
+    fn set_options(&self, options: &SetOptions) -> Option<ViewerMessage<'static>> {
+        let tone_map = match options.tone_map.as_deref().map(|name| ToneMap::from_name(name).ok_or(name)) {
+            Some(Err(_)) => return Some(ViewerMessage::wrong("there is no such tone mapping")),
             Some(Ok(map)) => Some(map),
             None => None,
         };
         self.change(|inner| {
             let wanted = &mut inner.wanted;
             let before = wanted.clone();
-            wanted.exposure = wishes.exposure.map(|stops| stops.clamp(-100.0, 100.0)).or(wanted.exposure);
+            wanted.exposure = options.exposure.map(|stops| stops.clamp(-100.0, 100.0)).or(wanted.exposure);
             wanted.tone_map = tone_map.or(wanted.tone_map);
-            wanted.false_colour = wishes.false_colour.unwrap_or(wanted.false_colour);
-            wanted.map = wishes.map.unwrap_or(wanted.map);
-            if let Some(range) = &wishes.range {
+            wanted.false_colour = options.false_colour.unwrap_or(wanted.false_colour);
+            wanted.map = options.map.unwrap_or(wanted.map);
+            if let Some(range) = &options.range {
                 wanted.range = match range[..] {
                     [low, high] if low < high && low.is_finite() && high.is_finite() => Some([low, high]),
                     _ => None,
                 };
             }
-            wanted.channel = wishes.channel.unwrap_or(wanted.channel);
-            wanted.denoise = wishes.denoise.or(wanted.denoise);
-            wanted.paused = wishes.paused.unwrap_or(wanted.paused);
-            wanted.scale = wishes.scale.filter(|s| s.is_finite()).map_or(wanted.scale, |s| s.clamp(0.1, 2.0));
-            wanted.spp = wishes.spp.map(|spp| spp.clamp(1, 1 << 20)).or(wanted.spp);
-            if let Some(noise) = wishes.noise.filter(|noise| noise.is_finite() && *noise >= 0.0) {
+            wanted.channel = options.channel.unwrap_or(wanted.channel);
+            wanted.denoise = options.denoise.or(wanted.denoise);
+            wanted.paused = options.paused.unwrap_or(wanted.paused);
+            wanted.scale =
+                options.scale.filter(|s| s.is_finite()).map_or(wanted.scale, |s| s.clamp(0.1, 2.0));
+            wanted.spp = options.spp.map(|spp| spp.clamp(1, 1 << 20)).or(wanted.spp);
+            if let Some(noise) = options.noise.filter(|noise| noise.is_finite() && *noise >= 0.0) {
                 wanted.noise = Some(noise);
                 // No limit on samples, unless one was given.
                 let most = Some(Stop::MAX_FOR_NOISE);
@@ -448,7 +452,7 @@ impl Session {
         None
     }
 
-    fn edit(&self, path: String, value: Option<String>) -> Option<Value> {
+    fn edit(&self, path: String, value: Option<String>) -> Option<ViewerMessage<'static>> {
         let is_long =
             path.len() > LONGEST_SETTING || value.as_ref().is_some_and(|v| v.len() > LONGEST_SETTING);
         let mut is_full = false;
@@ -465,8 +469,7 @@ impl Session {
             }
             inner.wanted.changes.build += 1;
         });
-        (is_long || is_full)
-            .then(|| json!({ "type": "wrong", "what": "too many parameters are set, or one is too long" }))
+        (is_long || is_full).then(|| ViewerMessage::wrong("too many parameters are set, or one is too long"))
     }
 
     /// The stage, the camera that looks at it, and the size of the picture.
@@ -477,13 +480,13 @@ impl Session {
         Some((stage, camera, inner.shot.as_ref()?.full))
     }
 
-    fn pick(&self, x: f64, y: f64, request: u32) -> Option<Value> {
+    fn pick(&self, x: f64, y: f64, request: u32) -> Option<ViewerMessage<'static>> {
         let (stage, camera, full) = self.shown()?;
         if !(0.0 <= x && x <= f64::from(full.0) && 0.0 <= y && y <= f64::from(full.1)) {
             return None;
         }
-        let met = stage.pick(camera, full, x, y);
-        Some(json!({ "type": "picked", "request": request, "x": x, "y": y, "ray": met }))
+        let ray = stage.pick(camera, full, x, y);
+        Some(ViewerMessage::Picked { request, x, y, ray })
     }
 
     /// The explanation of a pixel, as a page in a language; `None` if there is no explainer.
@@ -493,7 +496,7 @@ impl Session {
     }
 
     /// The values of pixels of the last complete picture, row by row.
-    fn values(&self, [x0, y0, width, height]: [u32; 4], request: u32) -> Option<Value> {
+    fn values(&self, [x0, y0, width, height]: [u32; 4], request: u32) -> Option<ViewerMessage<'static>> {
         let (shot, _) = self.shot()?;
         let image = shot.image();
         let is_whole = (image.width(), image.height()) == shot.full;
@@ -504,12 +507,12 @@ impl Session {
             (x0.saturating_add(width).min(image.width()), y0.saturating_add(height).min(image.height()));
         let pixels = (y0..y1).flat_map(|y| (x0..x1).map(move |x| image.pixel(x, y).to_array()));
         // JSON has no infinity: such numbers become text.
-        let said = |value: f32| if value.is_finite() { json!(value) } else { json!(value.to_string()) };
-        let values: Vec<Value> = pixels.map(|rgb| json!(rgb.map(said))).collect();
+        let value = |value: f32| {
+            if value.is_finite() { PixelValue::Number(value) } else { PixelValue::Text(value.to_string()) }
+        };
+        let values = pixels.map(|rgb| rgb.map(value)).collect();
         let (width, height) = (x1.saturating_sub(x0), y1.saturating_sub(y0));
-        Some(
-            json!({ "type": "values", "request": request, "x": x0, "y": y0, "width": width, "height": height, "values": values }),
-        )
+        Some(ViewerMessage::Values { request, x: x0, y: y0, width, height, values })
     }
 
     /// The picture as a file.
@@ -528,6 +531,7 @@ impl Session {
     }
 }
 
-fn tone_map_name(map: ToneMap) -> &'static str {
-    ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(map)).unwrap_or("none")
+fn tone_map_name(map: ToneMap) -> String {
+    let name = ToneMap::NAMES.into_iter().find(|name| ToneMap::from_name(name) == Some(map));
+    name.unwrap_or("none").to_owned()
 }

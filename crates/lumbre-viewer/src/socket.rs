@@ -7,15 +7,14 @@ use std::time::{Duration, Instant};
 use futures_util::{SinkExt, StreamExt};
 use hyper::upgrade::Upgraded;
 use hyper_util::rt::TokioIo;
-use serde_json::json;
 use tokio::sync::watch;
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::Message as Packet;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::protocol::{CloseFrame, Role, WebSocketConfig};
 
-use crate::guard::{Access, Guard, Secret};
-use crate::message::{Greeting, Message};
+use crate::guard::{Guard, Secret, Welcome};
+use crate::message::{Access, PageGreeting, PageMessage, ViewerGreeting, ViewerMessage, to_json};
 use crate::rate::Allowance;
 use crate::server::{Server, has_to_go};
 use crate::visitors::Visit;
@@ -59,17 +58,15 @@ pub(crate) async fn talk(stream: TokioIo<Upgraded>, server: Arc<Server>, visit: 
 /// Lets in a page that knows our secret, and proves to it that we know it, too. Nothing is said before.
 async fn greet(stream: &mut Stream, guard: &Guard, visit: &Visit) -> Result<Access, Ended> {
     let challenge = Secret::new().map_err(|_| None)?;
-    let asked = json!({ "type": "challenge", "nonce": challenge.digits() });
-    send(stream, Packet::text(asked.to_string())).await?;
+    let asked = ViewerGreeting::Challenge { nonce: challenge.digits() };
+    send(stream, Packet::text(to_json(&asked))).await?;
     let answer = tokio::time::timeout(HELLO_WITHIN, stream.next()).await;
     let unknown = || Some((UNKNOWN, "this page is not known"));
     let Ok(Some(Ok(Packet::Text(text)))) = answer else { return Err(unknown()) };
-    let Greeting::Hello { nonce, proof } = serde_json::from_str(&text).map_err(|_| unknown())?;
+    let PageGreeting::Hello { nonce, proof } = serde_json::from_str(&text).map_err(|_| unknown())?;
     let welcome = guard.admit(&challenge, &nonce, &proof).filter(|_| visit.let_in()).ok_or_else(unknown)?;
-    let access = welcome.access;
-    let welcome =
-        json!({ "type": "welcome", "proof": welcome.proof, "session": welcome.session, "access": access });
-    send(stream, Packet::text(welcome.to_string())).await?;
+    let Welcome { proof, session, access } = welcome;
+    send(stream, Packet::text(to_json(&ViewerGreeting::Welcome { proof, session, access }))).await?;
     Ok(access)
 }
 
@@ -97,21 +94,21 @@ async fn converse(stream: &mut Stream, server: &Server, access: Access) -> Resul
                 }
                 match packet {
                     Packet::Text(text) => {
-                        let message: Message = serde_json::from_str(&text)
+                        let message: PageMessage = serde_json::from_str(&text)
                             .map_err(|_| Some((CloseCode::Policy, "the message is not understood")))?;
-                        may_send |= message == Message::Shown {};
+                        may_send |= message == PageMessage::Shown {};
                         let answer = match message {
                             message if access == Access::Watch && !message.only_asks() => {
-                                Some(json!({ "type": "wrong", "what": "this page looks on: it changes nothing" }))
+                                Some(ViewerMessage::wrong("this page looks on: it changes nothing"))
                             }
-                            Message::Ticket { request, errand } => {
+                            PageMessage::Ticket { request, errand } => {
                                 let address = server.guard.ticket(errand);
-                                Some(json!({ "type": "ticket", "request": request, "address": address }))
+                                Some(ViewerMessage::Ticket { request, address })
                             }
-                            message => session.obey(message),
+                            message => session.handle_message(message),
                         };
                         if let Some(answer) = answer {
-                            send(stream, Packet::text(answer.to_string())).await?;
+                            send(stream, Packet::text(to_json(&answer))).await?;
                         }
                     }
                     Packet::Binary(_) => return Err(Some((CloseCode::Unsupported, "text is expected"))),

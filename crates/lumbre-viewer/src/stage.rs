@@ -7,9 +7,12 @@ use lumbre::description::{Camera, CameraView, UpAxis};
 use lumbre::{
     Background, DVec2, DVec3, Parameter, ParameterKind, Ray, RenderOptions, SaveOptions, Scene, SceneDesc,
 };
-use serde_json::{Value, json};
 
-use crate::camera::{Placement, field_of_view};
+use crate::camera::field_of_view;
+use crate::message::{
+    AnimationFacts, CameraFacts, HitSurface, ListedHit, ListedParameter, PickedRay, Placement, Plane,
+    SceneFacts, ValueKind,
+};
 use crate::source::{Built, Explain};
 use crate::tree::{Thing, things, tree};
 
@@ -32,7 +35,7 @@ pub(crate) struct Stage {
     things: Vec<Thing>,
     explain: Option<Box<dyn Explain>>,
     /// The facts of the scene for every page.
-    pub facts: Value,
+    pub facts: SceneFacts,
 }
 
 /// Hits that are listed of one ray.
@@ -74,23 +77,24 @@ impl Stage {
     }
 
     /// All hits of the ray through a point of the picture, by distance.
-    pub(crate) fn pick(&self, camera: usize, size: (u32, u32), x: f64, y: f64) -> Value {
+    pub(crate) fn pick(&self, camera: usize, size: (u32, u32), x: f64, y: f64) -> PickedRay {
         let scene = self.scene();
-        let Some(ray) = ray(&scene, camera, size, x, y) else { return json!({ "hits": [] }) };
+        let Some(ray) = ray(&scene, camera, size, x, y) else { return PickedRay::default() };
         let mut hits = Vec::new();
         scene.all(&ray, |hit| {
-            let mut told = self.thing(hit.shape).told(hit.shape);
-            told["distance"] = json!(hit.t);
-            told["point"] = json!(hit.point.to_array());
-            told["normal"] = json!(hit.normal.to_array());
-            told["uv"] = json!(hit.uv.to_array());
-            told["front"] = json!(hit.front);
-            told["primitive"] = json!(hit.primitive);
-            told["instance"] = json!(hit.instance);
-            hits.push(told);
+            let surface = HitSurface {
+                point: hit.point.to_array(),
+                normal: hit.normal.to_array(),
+                uv: hit.uv.to_array(),
+                front: hit.front,
+                primitive: hit.primitive,
+                instance: hit.instance,
+            };
+            let shape = self.thing(hit.shape).listed(hit.shape);
+            hits.push(ListedHit { shape, distance: hit.t, surface: Some(surface) });
             if hits.len() < MAX_HITS { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         });
-        json!({ "origin": ray.origin.to_array(), "direction": ray.direction.to_array(), "hits": hits })
+        PickedRay { origin: Some(ray.origin.to_array()), direction: Some(ray.direction.to_array()), hits }
     }
 
     /// The shape with this number.
@@ -145,7 +149,7 @@ fn facts(
     cameras: &[Camera],
     languages: &[(&str, &str)],
     warnings: &[String],
-) -> Value {
+) -> SceneFacts {
     let info = scene.info();
     let up = match desc.up {
         UpAxis::Y => DVec3::Y,
@@ -154,45 +158,49 @@ fn facts(
     };
     let camera = |(i, camera): (usize, &Camera)| {
         let kind = camera.kind.name();
-        let mirrored = camera.world_from_camera.is_mirror();
-        let name = camera.name.clone().unwrap_or_else(|| format!("{i} ({kind})"));
-        json!({ "name": name, "kind": kind, "mirrored": mirrored, "fov": field_of_view(camera) })
-    };
-    let parameter = |parameter: &Parameter| {
-        let (kind, low, high) = match parameter.kind {
-            ParameterKind::Number { low, high } => ("number", low, high),
-            ParameterKind::Colour => ("colour", 0.0, 1.0),
-            ParameterKind::Light => ("light", 0.0, f64::INFINITY),
-            ParameterKind::Point => ("point", f64::NEG_INFINITY, f64::INFINITY),
-            ParameterKind::Factor | _ => ("factor", 0.0, f64::INFINITY),
-        };
-        let (path, owner, name, value) =
-            (&parameter.path, &parameter.owner, &parameter.name, &parameter.value);
-        // JSON has no infinity: such a range has no end.
-        json!({ "path": path, "owner": owner, "name": name, "kind": kind, "value": value,
-                "low": low.is_finite().then_some(low), "high": high.is_finite().then_some(high) })
+        CameraFacts {
+            name: camera.name.clone().unwrap_or_else(|| format!("{i} ({kind})")),
+            kind: kind.to_owned(),
+            mirrored: camera.world_from_camera.is_mirror(),
+            fov: field_of_view(camera),
+        }
     };
     let parameters = lumbre::parameters(desc);
     let animations = info.listing.animations.iter();
-    json!({
-        "cameras": cameras.iter().enumerate().map(camera).collect::<Vec<_>>(),
-        "up": up.to_array(),
-        "ground": scene.resolved().ground().map(|ground| {
-            json!({ "point": ground.point.to_array(), "normal": ground.normal.to_array() })
-        }),
-        "tree": tree(desc),
-        "bounds": info.bounds.map(|bounds| [bounds.min.to_array(), bounds.max.to_array()]),
-        "shapes": info.shapes,
-        "materials": info.materials,
-        "lights": info.lights,
-        "triangles": info.triangles,
-        "instances": info.instances,
-        "memory": info.memory_bytes,
-        "build_seconds": scene.build_time().as_secs_f64(),
-        "animations": animations.map(|a| json!({ "name": a.name, "end": a.end })).collect::<Vec<_>>(),
-        "variants": info.listing.variants,
-        "parameters": parameters.iter().take(MAX_PARAMETERS).map(parameter).collect::<Vec<_>>(),
-        "languages": languages,
-        "warnings": warnings,
-    })
+    let ground = scene.resolved().ground();
+    SceneFacts {
+        cameras: cameras.iter().enumerate().map(camera).collect(),
+        up: up.to_array(),
+        ground: ground
+            .map(|ground| Plane { point: ground.point.to_array(), normal: ground.normal.to_array() }),
+        tree: tree(desc),
+        bounds: info.bounds.map(|bounds| [bounds.min.to_array(), bounds.max.to_array()]),
+        shapes: info.shapes.clone(),
+        materials: info.materials.clone(),
+        lights: info.lights.clone(),
+        triangles: info.triangles,
+        instances: info.instances,
+        memory: info.memory_bytes,
+        build_seconds: scene.build_time().as_secs_f64(),
+        animations: animations.map(|a| AnimationFacts { name: a.name.clone(), end: a.end }).collect(),
+        variants: info.listing.variants.clone(),
+        parameters: parameters.into_iter().take(MAX_PARAMETERS).map(listed).collect(),
+        languages: languages.iter().map(|&(code, name)| (code.to_owned(), name.to_owned())).collect(),
+        warnings: warnings.to_vec(),
+    }
+}
+
+/// A parameter as a page lists it.
+fn listed(parameter: Parameter) -> ListedParameter {
+    let (kind, low, high) = match parameter.kind {
+        ParameterKind::Number { low, high } => (ValueKind::Number, low, high),
+        ParameterKind::Colour => (ValueKind::Colour, 0.0, 1.0),
+        ParameterKind::Light => (ValueKind::Light, 0.0, f64::INFINITY),
+        ParameterKind::Point => (ValueKind::Point, f64::NEG_INFINITY, f64::INFINITY),
+        ParameterKind::Factor | _ => (ValueKind::Factor, 0.0, f64::INFINITY),
+    };
+    let Parameter { path, owner, name, value, .. } = parameter;
+    // JSON has no infinity: such a range has no end.
+    let [low, high] = [low, high].map(|end| end.is_finite().then_some(end));
+    ListedParameter { path, owner, name, kind, value, low, high }
 }

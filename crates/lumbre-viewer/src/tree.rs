@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use lumbre::SceneDesc;
 use lumbre::description::ShapeDesc;
-use serde_json::{Value, json};
+
+use crate::message::{HiddenShapes, ListedShape, ShapeGroup, ShapeTree};
 
 /// Shapes that a page can list.
 const MAX_LISTED: usize = 2000;
@@ -40,9 +41,9 @@ impl Hidden {
         }
     }
 
-    /// As a page hears it.
-    pub(crate) fn told(&self) -> Value {
-        json!({ "shapes": self.shapes, "others": self.others })
+    /// As a page lists them.
+    pub(crate) fn listed(&self) -> HiddenShapes {
+        HiddenShapes { shapes: self.shapes.iter().copied().collect(), others: self.others }
     }
 }
 
@@ -85,12 +86,18 @@ impl Thing {
         }
     }
 
-    /// As a page hears it.
-    pub(crate) fn told(&self, shape: u32) -> Value {
+    /// As a page lists it.
+    pub(crate) fn listed(&self, shape: u32) -> ListedShape {
         let Self { kind, name, material, shines } = self;
-        let (label, owner) = (material.as_ref().map(|of| &*of.label), material.as_ref().map(|of| &*of.owner));
-        json!({ "shape": shape, "kind": kind, "name": name.as_deref(), "material": label, "owner": owner,
-                "shines": shines })
+        let text = |text: &Arc<str>| text.as_ref().to_owned();
+        ListedShape {
+            shape,
+            kind: (*kind).to_owned(),
+            name: name.as_ref().map(text),
+            material: material.as_ref().map(|of| text(&of.label)),
+            owner: material.as_ref().map(|of| text(&of.owner)),
+            shines: *shines,
+        }
     }
 }
 
@@ -121,17 +128,15 @@ pub(crate) fn things(desc: &SceneDesc) -> Vec<Thing> {
 }
 
 /// The shapes of the world and of each object, as a page lists them.
-pub(crate) fn tree(desc: &SceneDesc) -> Value {
+pub(crate) fn tree(desc: &SceneDesc) -> ShapeTree {
     let substances = substances(desc);
     let mut left = MAX_LISTED;
     let mut group = |name: Option<&str>, shapes: &[ShapeDesc]| {
         let listed = shapes.len().min(left);
         left -= listed;
-        let shapes: Vec<Value> = shapes[..listed]
-            .iter()
-            .map(|shape| Thing::new(shape, desc, &substances).told(shape.index))
-            .collect();
-        json!({ "name": name, "shapes": shapes })
+        let shapes = shapes[..listed].iter();
+        let shapes = shapes.map(|shape| Thing::new(shape, desc, &substances).listed(shape.index));
+        ShapeGroup { name: name.map(str::to_owned), shapes: shapes.collect() }
     };
     let mut groups = vec![group(None, &desc.shapes)];
     groups.extend(
@@ -140,9 +145,9 @@ pub(crate) fn tree(desc: &SceneDesc) -> Value {
             .filter(|object| !object.shapes.is_empty())
             .map(|object| group(Some(&object.name), &object.shapes)),
     );
-    groups.retain(|group| group["shapes"].as_array().is_some_and(|shapes| !shapes.is_empty()));
+    groups.retain(|group| !group.shapes.is_empty());
     let all = desc.shapes.len() + desc.objects.iter().map(|object| object.shapes.len()).sum::<usize>();
-    json!({ "groups": groups, "left_out": all - (MAX_LISTED - left) })
+    ShapeTree { groups, left_out: all - (MAX_LISTED - left) }
 }
 
 #[cfg(test)]
@@ -176,9 +181,9 @@ mod tests {
         assert_eq!(left(&Hidden::new([1, 2], false)), [0, 3]);
         assert_eq!(left(&Hidden::new([1, 2, 77], true)), [1, 2]);
         assert_eq!(left(&Hidden::new([], true)), [0, 1, 2, 3]);
-        let told = tree(&desc);
-        assert_eq!(told["groups"][1]["name"], "pair");
-        assert_eq!(told["groups"][1]["shapes"][1]["shape"], 3);
-        assert_eq!(told["left_out"], 0);
+        let tree = tree(&desc);
+        assert_eq!(tree.groups[1].name.as_deref(), Some("pair"));
+        assert_eq!(tree.groups[1].shapes[1].shape, 3);
+        assert_eq!(tree.left_out, 0);
     }
 }

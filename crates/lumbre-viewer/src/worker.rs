@@ -13,11 +13,10 @@ use lumbre::{
     Setting, State, Stats, Stop,
 };
 use rayon::prelude::*;
-use serde_json::{Value, json};
 
 use crate::camera::moved;
-use crate::frame::{Channel, Look, Pixels, Shot, id_colour};
-use crate::message::Plane;
+use crate::frame::{Look, Pixels, Shot, id_colour};
+use crate::message::{Channel, Doing, Plane, RenderProgress};
 use crate::session::{Changes, Session, Wanted};
 use crate::source::{Read, SourceError};
 use crate::stage::{Stage, ray};
@@ -121,12 +120,10 @@ impl Worker {
 
     /// Reads and builds; returns whether there is a new stage.
     fn load(&mut self, wanted: &Wanted, read: bool) -> bool {
-        self.session.tell_progress(
-            &json!({ "type": "progress", "doing": if read { "reading" } else { "building" } }),
-        );
+        self.publish(if read { Doing::Reading } else { Doing::Building });
         let source = self.session.source();
         if source.is_empty() {
-            self.session.tell_progress(&json!({ "type": "progress", "doing": "nothing" }));
+            self.publish(Doing::Nothing);
             return false;
         }
         let loaded = self.read(&*source, wanted, read);
@@ -134,9 +131,9 @@ impl Worker {
         if let Ok(stage) = &loaded {
             self.stage = Some(stage.clone());
         } else {
-            self.session.tell_progress(&json!({ "type": "progress", "doing": "waiting" }));
+            self.publish(Doing::Waiting);
         }
-        self.session.staged(loaded.map_err(|error| error.to_string()));
+        self.session.publish_stage(loaded.map_err(|error| error.to_string()));
         is_fine
     }
 
@@ -163,7 +160,7 @@ impl Worker {
                 wrong = Some(why);
             }
         }
-        self.session.edited(wrong);
+        self.session.publish_edit_error(wrong);
         let built = source.build(desc, &wanted.hidden)?;
         let mut stage = Stage::new(built, &read.desc, read.warnings.clone());
         // A shape that is hidden does not change what the camera turns around.
@@ -217,24 +214,38 @@ impl Worker {
         if let Err(error) = self.session.source().check(&options) {
             return self.fail(&error);
         }
-        self.session.pictured(Ok(()));
+        self.session.publish_picture_error(Ok(()));
         self.options = options;
         self.options.stop.spp = self.target(wanted, &stage);
         self.options.stop.noise = noise(wanted, &stage);
         (self.state, self.noise) = (None, None);
         (self.spent, self.shown) = (Duration::ZERO, Duration::ZERO);
-        self.tell_start(None);
+        self.publish_start(None);
         self.sequence = wanted.sequence;
         self.step =
             if wanted.channel == Channel::Ids { Step::Full(1) } else { Step::First(self.coarseness()) };
     }
 
     /// Says that no sample of the full picture is taken yet, and how long it will take, as far as that is known.
-    fn tell_start(&self, left: Option<f64>) {
-        self.session.tell_progress(&json!({
-            "type": "progress", "doing": "rendering", "spp": 0, "target": self.options.stop.spp, "share": 0, "left": left,
-            "noise_target": self.options.stop.noise,
-        }));
+    fn publish_start(&self, left: Option<f64>) {
+        self.session.publish_progress(RenderProgress {
+            spp: Some(0),
+            share: Some(0.0),
+            left,
+            ..self.rendering()
+        });
+    }
+
+    /// Says what the viewer is doing, where there is no more to say.
+    fn publish(&self, doing: Doing) {
+        self.session.publish_progress(RenderProgress { doing, ..RenderProgress::default() });
+    }
+
+    /// That the picture is being rendered, up to these samples or this noise.
+    fn rendering(&self) -> RenderProgress {
+        let Stop { spp, noise, .. } = self.options.stop;
+        let (target, noise_target) = (Some(spp), noise);
+        RenderProgress { doing: Doing::Rendering, target, noise_target, ..RenderProgress::default() }
     }
 
     fn target(&self, wanted: &Wanted, stage: &Stage) -> u32 {
@@ -324,9 +335,9 @@ impl Worker {
         };
         let pixels = Pixels::Rendered(Box::new(picture));
         self.show(wanted, Shown { pixels, is_full: false, is_done: false, is_denoised });
-        // To a noise target there is no telling yet.
+        // To a noise target there is no progress yet.
         let samples = self.pixels() * f64::from(self.options.stop.spp);
-        self.tell_start(self.options.stop.noise.is_none().then_some(samples / self.speed));
+        self.publish_start(self.options.stop.noise.is_none().then_some(samples / self.speed));
         self.step = if side > 5 { Step::Coarse(side / 3) } else { Step::Full(1) };
     }
 
@@ -360,16 +371,15 @@ impl Worker {
         let scene = stage.scene();
         let state = self.state.take();
         let before = state.as_ref().map_or(0, RenderState::taken);
-        let telling = Telling {
+        let progress = PassProgress {
             session: &self.session,
             known: self.known,
             pixels: self.pixels(),
             spent: self.spent,
             way: self.way(state.as_ref()),
-            words: json!({ "type": "progress", "doing": "rendering", "target": target,
-                           "noise_target": self.options.stop.noise }),
+            start: self.rendering(),
         };
-        let rendered = scene.render_from(&options, &telling, &cancel, state, None);
+        let rendered = scene.render_from(&options, &progress, &cancel, state, None);
         drop(scene);
         let (picture, state) = match rendered {
             Ok(rendered) => rendered,
@@ -394,7 +404,7 @@ impl Worker {
             return;
         }
         self.step = if is_done { Step::Done } else { Step::Full(self.next(options.stop.spp, target)) };
-        self.tell_of(&stats, is_done);
+        self.publish_stats(&stats, is_done);
     }
 
     /// Whether the picture is shown after this pass: not where the denoiser would take too much of the time.
@@ -447,26 +457,24 @@ impl Worker {
         self.options.bounds().map_or(1.0, |bounds| bounds.area() as f64)
     }
 
-    fn tell_of(&mut self, stats: &Stats, is_done: bool) {
+    fn publish_stats(&mut self, stats: &Stats, is_done: bool) {
         self.noise = stats.noise;
         let rays = stats.rays.camera + stats.rays.bounce + stats.rays.shadow;
         let spent = self.spent.as_secs_f64().max(1e-6);
         let spp = stats.samples as f64 / self.pixels();
         let share = if is_done { 1.0 } else { (spp * self.way(self.state.as_ref())).min(1.0) };
         let left = (share > 0.0).then(|| spent * (1.0 - share) / share);
-        self.session.tell_progress(&json!({
-            "type": "progress",
-            "doing": if is_done { "done" } else { "rendering" },
-            "spp": if stats.noise_target.is_some() { spp.rounded() as u32 } else { stats.spp },
-            "target": self.options.stop.spp,
-            "share": share,
-            "noise": stats.noise,
-            "noise_target": self.options.stop.noise,
-            "rays_per_second": rays as f64 / spent,
-            "seconds": spent,
-            "left": left,
-            "dropped": stats.dropped,
-        }));
+        self.session.publish_progress(RenderProgress {
+            doing: if is_done { Doing::Done } else { Doing::Rendering },
+            spp: Some(if stats.noise_target.is_some() { spp.rounded() as u32 } else { stats.spp }),
+            share: Some(share),
+            noise: stats.noise,
+            rays_per_second: Some(rays as f64 / spent),
+            seconds: Some(spent),
+            left,
+            dropped: Some(stats.dropped),
+            ..self.rendering()
+        });
     }
 
     /// A colour for each shape.
@@ -494,14 +502,14 @@ impl Worker {
         let pixels = Pixels::Plain(image);
         self.show(wanted, Shown { pixels, is_full: true, is_done: true, is_denoised: false });
         self.step = Step::Done;
-        self.session.tell_progress(&json!({ "type": "progress", "doing": "done" }));
+        self.publish(Doing::Done);
     }
 
     /// There can be no picture: the page says why.
     fn fail(&mut self, error: &dyn std::fmt::Display) {
         self.step = Step::Done;
-        self.session.pictured(Err(error.to_string()));
-        self.session.tell_progress(&json!({ "type": "progress", "doing": "nothing" }));
+        self.session.publish_picture_error(Err(error.to_string()));
+        self.publish(Doing::Nothing);
     }
 
     fn measure(&mut self, speed: f64) {
@@ -529,7 +537,7 @@ struct Shown {
 
 /// What a page is to hear while a pass goes on. It knows whether the picture is still wanted: a large one takes longer
 /// to put together than one may wait for the next.
-struct Telling<'s> {
+struct PassProgress<'s> {
     session: &'s Session,
     known: Changes,
     pixels: f64,
@@ -537,22 +545,18 @@ struct Telling<'s> {
     spent: Duration,
     /// See [`Worker::way`].
     way: f64,
-    /// What is said at any time.
-    words: Value,
+    /// What does not change during the pass.
+    start: RenderProgress,
 }
 
-impl Progress for Telling<'_> {
+impl Progress for PassProgress<'_> {
     fn state(&self, state: &State) {
         let spp = state.samples as f64 / self.pixels;
         let share = (spp * self.way).clamp(0.0, 1.0);
         let spent = (self.spent + state.elapsed).as_secs_f64();
-        let mut words = self.words.clone();
-        words["spp"] = json!(spp as u32);
-        words["share"] = json!(share);
-        if share > 0.0 {
-            words["left"] = json!(spent * (1.0 - share) / share);
-        }
-        self.session.tell_progress(&words);
+        let left = (share > 0.0).then(|| spent * (1.0 - share) / share);
+        let (spp, share) = (Some(spp as u32), Some(share));
+        self.session.publish_progress(RenderProgress { spp, share, left, ..self.start.clone() });
     }
 
     fn is_wanted(&self) -> bool {

@@ -6,3 +6,4 @@ mod client;
 mod files;
 mod hostile;
 mod picture;
+mod protocol;

@@ -178,7 +178,8 @@ impl Target {
 struct Toolchain {
     cargo: OsString,
     rustc: OsString,
-    /// Whether the standard library is compiled, from its sources. That takes a switch of nightly compilers, which a variable allows.
+    /// Whether the standard library is compiled, from its sources. That takes a switch of nightly compilers, which a
+    /// variable allows.
     builds_std: bool,
 }
 

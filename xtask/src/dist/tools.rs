@@ -1,5 +1,5 @@
-//! What artefacts are made with, in a virtual environment of Python under `target`: maturin, cargo-zigbuild and Zig's linker; and
-//! archives and sums by Python itself.
+//! What artefacts are made with, in a virtual environment of Python under `target`: maturin, cargo-zigbuild and Zig's
+//! linker; and archives and sums by Python itself.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -56,7 +56,8 @@ fn everywhere(start: f64, coefficients: impl Into<Vec<f64>>) -> Vec<Piece> {
     vec![Piece { from: f64::NEG_INFINITY, scale: 1.0, start, coefficients: coefficients.into() }]
 }
 
-/// The shape along the line of a ray, both in the shape's own space, as it is explained; `None` where no function is at hand.
+/// The shape along the line of a ray, both in the shape's own space, as it is explained; `None` where no function is at
+/// hand.
 pub(super) fn along(shape: &Shape, explanation: &Explanation, ray: &Ray) -> Option<Along> {
     let number = |topic: Topic, symbol: &str| number(explanation, topic, symbol);
     // The steps of a ray whose direction was scaled are of that, and have other t.
@@ -186,8 +187,8 @@ fn quartic(torus: &Torus, ray: &Ray) -> Vec<Piece> {
     )
 }
 
-/// The square of the distance from the segment in the middle of a capsule, less that of the radius: near one end, along the side, and
-/// near the other end.
+/// The square of the distance from the segment in the middle of a capsule, less that of the radius: near one end, along
+/// the side, and near the other end.
 fn by_parts(capsule: &Capsule, explanation: &Explanation, ray: &Ray) -> Option<Vec<Piece>> {
     let end = |symbol: &str| vector(explanation, Topic::Parameters, symbol);
     let (first, second) = (end("P₁")?, end("P₂")?);
@@ -220,7 +221,8 @@ fn by_parts(capsule: &Capsule, explanation: &Explanation, ray: &Ray) -> Option<V
     ])
 }
 
-/// With P = P₀₀ + α·E₁ + β·E₂ + γ·E₃, the surface is where γ = α·β; where these three do not span space, it is in a plane.
+/// With P = P₀₀ + α·E₁ + β·E₂ + γ·E₃, the surface is where γ = α·β; where these three do not span space, it is in a
+/// plane.
 fn of_patch(patch: &BilinearPatch, ray: &Ray) -> (&'static str, Vec<f64>) {
     let [p00, p10, p01, p11] = patch.corners();
     let (e1, e2) = (p10 - p00, p01 - p00);

@@ -24,8 +24,8 @@ pub(super) fn holds(formula: &str, result: &str, of_colours: bool) -> Option<boo
     is_known.then(|| pairs.into_iter().all(|(a, b)| is_close(a, b)))
 }
 
-/// A number of about 32 digits: the sum of two doubles, of which the first is the number rounded (Dekker, "A floating-point technique
-/// for extending the available precision", 1971).
+/// A number of about 32 digits: the sum of two doubles, of which the first is the number rounded (Dekker, "A
+/// floating-point technique for extending the available precision", 1971).
 #[derive(Clone, Copy, Debug)]
 struct Twofold {
     high: f64,

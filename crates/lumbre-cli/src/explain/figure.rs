@@ -1,5 +1,5 @@
-//! The figure of a shape: the ray and the shape in the world and in the shape's own space, and F(t) along the ray. Its marks have the
-//! names of the symbols of the explanation.
+//! The figure of a shape: the ray and the shape in the world and in the shape's own space, and F(t) along the ray. Its
+//! marks have the names of the symbols of the explanation.
 
 use std::collections::BTreeSet;
 

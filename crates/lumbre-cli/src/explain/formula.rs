@@ -402,8 +402,9 @@ enum Part {
     },
 }
 
-/// The formula as MathML, which browsers set without help; quotients are stacked. It is several elements, between which a line may
-/// end. What is too wide for a narrow screen is there twice: stacked (`class="stacked"`) and in lines (`class="flat"`).
+/// The formula as MathML, which browsers set without help; quotients are stacked. It is several elements, between which
+/// a line may end. What is too wide for a narrow screen is there twice: stacked (`class="stacked"`) and in lines
+/// (`class="flat"`).
 pub(super) fn mathml(formula: &str, marks: &Marks<'_>) -> String {
     let mut lines = Lines::default();
     row(&tokens(formula), marks).iter().for_each(|part| lines.add(part));
@@ -526,7 +527,8 @@ impl Part {
         }
     }
 
-    /// As one element without the parentheses about all of it: the line of a quotient says as much. A vector keeps its own.
+    /// As one element without the parentheses about all of it: the line of a quotient says as much. A vector keeps its
+    /// own.
     fn without_parentheses(&self) -> String {
         match self {
             Self::Group { brackets: ['(', _], inner }

@@ -1,5 +1,5 @@
-//! What is told, as one page of HTML: formulas as MathML, figures as SVG, and a script that adds a slider and steps. Nothing is
-//! loaded from anywhere, and without the script nothing is missing but these two.
+//! What is told, as one page of HTML: formulas as MathML, figures as SVG, and a script that adds a slider and steps.
+//! Nothing is loaded from anywhere, and without the script nothing is missing but these two.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;

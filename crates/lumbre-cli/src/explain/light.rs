@@ -509,7 +509,8 @@ impl Path<'_> {
         section
     }
 
-    /// The next direction, chosen at a surface that was `met` or in a medium, by a path that carries something, with its symbol.
+    /// The next direction, chosen at a surface that was `met` or in a medium, by a path that carries something, with
+    /// its symbol.
     fn scattered(&self, next: &Scattered, met: Option<&Met>, carried: Option<(&str, Spectrum)>) -> Section {
         let texts = self.texts;
         let Scattered { ray, weight, scatter, transmitted, eta, throughput } = next;

@@ -51,7 +51,8 @@ pub struct Request {
     /// The pixel, from 0,0 in the upper left corner.
     #[arg(long, value_name = "X,Y", value_parser = pixel)]
     pub pixel: Option<(u32, u32)>,
-    /// A ray instead of a pixel: its origin and direction (of any length but 0), then optionally its range of t (by default 0 to infinity).
+    /// A ray instead of a pixel: its origin and direction (of any length but 0), then optionally its range of t (by
+    /// default 0 to infinity).
     #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
     pub ray: Option<Ray>,
     /// The format of the explanation.
@@ -75,7 +76,8 @@ pub struct Request {
     /// Explain all shapes, also those that the ray misses.
     #[arg(long, conflicts_with_all = ["nearest", "shape"])]
     pub all_shapes: bool,
-    /// Print only the sections with these keys, the keys of JSON: camera, equation, Quadratic, hit, transform, light, radiance, …
+    /// Print only the sections with these keys, the keys of JSON: camera, equation, Quadratic, hit, transform, light,
+    /// radiance, …
     #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
     pub only: Vec<String>,
 }

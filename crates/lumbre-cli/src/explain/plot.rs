@@ -31,7 +31,8 @@ pub(super) struct Plot {
     /// The formula of `F`, where it has one, and those of what stands in it alone.
     pub(super) formula: Option<String>,
     pub(super) definitions: Vec<String>,
-    /// The pieces of the function: from where on, the scale and the start of its variable, and the coefficients, the constant first.
+    /// The pieces of the function: from where on, the scale and the start of its variable, and the coefficients, the
+    /// constant first.
     pub(super) pieces: Vec<Vec<f64>>,
 }
 

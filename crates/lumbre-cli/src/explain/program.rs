@@ -24,8 +24,8 @@ use crate::view::ViewArguments;
 
 /// Explains how a pixel gets its colour.
 ///
-/// Or how much light comes along a ray: the camera and its ray, every surface on the way with the equation of its crossings, normals,
-/// lights and shadows, and the path of one sample, with all numbers as the render computes them.
+/// Or how much light comes along a ray: the camera and its ray, every surface on the way with the equation of its
+/// crossings, normals, lights and shadows, and the path of one sample, with all numbers as the render computes them.
 #[derive(Args)]
 #[command(after_help = "Examples:
   lumbre explain scene.pbrt --pixel 320,240
@@ -37,7 +37,8 @@ use crate::view::ViewArguments;
   lumbre explain scene.pbrt --pixel 320,240 --format markdown --lang es
   lumbre explain model.glb --pixel 100,80 --size 200x160 --format json | jq .")]
 pub(crate) struct Arguments {
-    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip. Several are put into the same world.
+    /// The scene: .pbrt, .gltf, .glb, .obj, .ply, .stl or .pov, also compressed with gzip. Several are put into the
+    /// same world.
     #[arg(required = true, value_name = "SCENE")]
     scene: Vec<PathBuf>,
     #[command(flatten)]

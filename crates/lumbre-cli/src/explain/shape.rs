@@ -20,8 +20,8 @@ impl From<&Found> for Value {
     }
 }
 
-/// Adds the steps of a search for a kind of shape, and the results of the crossings. The scope contains the ray; `rename`
-/// maps the symbols of the ray to the names used here.
+/// Adds the steps of a search for a kind of shape, and the results of the crossings. The scope contains the ray;
+/// `rename` maps the symbols of the ray to the names used here.
 pub(super) fn tell(
     section: &mut Section,
     (kind, explanation): (&str, &Explanation),

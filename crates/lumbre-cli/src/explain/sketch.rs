@@ -18,7 +18,8 @@ const LINES: u32 = 8;
 const POINTS: u32 = 48;
 /// Maximum parts of a shape: the faces of a box.
 const PARTS: u32 = 6;
-/// A shape that is this many times as large as the ray is long on its way there is drawn near the crossing alone: a flat one, and others.
+/// A shape that is this many times as large as the ray is long on its way there is drawn near the crossing alone: a
+/// flat one, and others.
 const HUGE_FLAT: f64 = 4.0;
 const HUGE: f64 = 40.0;
 /// Of such a shape the square about the crossing whose half side is this part of the ray's way, with this many lines.
@@ -95,8 +96,8 @@ pub(super) struct Space {
     pub(super) path: Vec<DVec3>,
 }
 
-/// The lines of constant u and v of a shape under a map; near where it was met, of one that is infinite, or huge beside the `reach` of
-/// the ray on its way there.
+/// The lines of constant u and v of a shape under a map; near where it was met, of one that is infinite, or huge beside
+/// the `reach` of the ray on its way there.
 pub(super) fn lines(
     shape: &Shape,
     map: &Transform,
@@ -206,8 +207,8 @@ fn local(shape: &Shape, map: &Transform, point: DVec3, normal: DVec3, size: f64)
     lines.collect()
 }
 
-/// From where a space is looked at, orthographically: from the side of the ray, and a little from above and behind. What is up points
-/// up.
+/// From where a space is looked at, orthographically: from the side of the ray, and a little from above and behind.
+/// What is up points up.
 #[derive(Debug)]
 struct Eye {
     frame: Frame,
@@ -355,8 +356,8 @@ impl Extent {
     }
 }
 
-/// What of the line is drawn: from a little before the first crossing to a little after the last, and the ray's origin where that is
-/// not far away. `unit` is the `t` that is as long as the picture.
+/// What of the line is drawn: from a little before the first crossing to a little after the last, and the ray's origin
+/// where that is not far away. `unit` is the `t` that is as long as the picture.
 fn seen(space: &Space, near: &[&Crossing], unit: f64) -> Seen {
     let places = near.iter().map(|crossing| crossing.t).chain(space.nearest.map(|(t, _)| t));
     let (first, last) =
@@ -584,7 +585,8 @@ impl Drawing {
         self.labels.keep_off(rect);
     }
 
-    /// `view` is where the origin of the space is seen, and by how much a unit along x, y and z moves that: for what is dragged.
+    /// `view` is where the origin of the space is seen, and by how much a unit along x, y and z moves that: for what is
+    /// dragged.
     fn finish(mut self, title: &str, [start, step]: [DVec2; 2], first: f64, view: &str) -> String {
         self.wanted.sort_by_key(|wanted| wanted.rank);
         let mut placed: Vec<Option<Label>> = vec![None; self.marks.len()];

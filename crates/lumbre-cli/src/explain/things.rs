@@ -85,8 +85,8 @@ impl SceneNames {
         self.shapes.get(&shape).map_or("ground", |thing| thing.kind)
     }
 
-    /// Whether a name selects a shape: its index, its kind, in the words of the scene language or in those of `kind_of`, or the name
-    /// of its material.
+    /// Whether a name selects a shape: its index, its kind, in the words of the scene language or in those of
+    /// `kind_of`, or the name of its material.
     pub(super) fn is_called(
         &self,
         shape: u32,

@@ -1,169 +1,5 @@
 "use strict";
 (() => {
-  // src/proof.ts
-  var IV = [1779033703, 3144134277, 1013904242, 2773480762, 1359893119, 2600822924, 528734635, 1541459225];
-  var ORDER = [2, 6, 3, 10, 7, 0, 4, 13, 1, 11, 12, 5, 9, 14, 15, 8];
-  var QUARTERS = [
-    [0, 4, 8, 12],
-    [1, 5, 9, 13],
-    [2, 6, 10, 14],
-    [3, 7, 11, 15],
-    [0, 5, 10, 15],
-    [1, 6, 11, 12],
-    [2, 7, 8, 13],
-    [3, 4, 9, 14]
-  ];
-  var FLAGS = 1 | 2 | 8 | 16;
-  var BLOCK = 64;
-  function keyedHash(key2, bytes2) {
-    if (key2.length !== 32 || bytes2.length > BLOCK) throw new Error("one block and a key of 32 bytes");
-    const words = (of, count) => {
-      const view = new DataView(Uint8Array.from({ length: 4 * count }, (_, i) => of[i] ?? 0).buffer);
-      return Array.from({ length: count }, (_, i) => view.getUint32(4 * i, true));
-    };
-    const v = Uint32Array.from([...words(key2, 8), ...IV.slice(0, 4), 0, 0, bytes2.length, FLAGS]);
-    const at = (i) => v[i] ?? 0;
-    const turned2 = (x, by) => x >>> by | x << 32 - by;
-    let block = words(bytes2, 16);
-    for (let round = 0; round < 7; round++) {
-      QUARTERS.forEach(([a, b, c, d], quarter) => {
-        for (const [which, first, second] of [[0, 16, 12], [1, 8, 7]]) {
-          v[a] = at(a) + at(b) + (block[2 * quarter + which] ?? 0);
-          v[d] = turned2(at(d) ^ at(a), first);
-          v[c] = at(c) + at(d);
-          v[b] = turned2(at(b) ^ at(c), second);
-        }
-      });
-      block = ORDER.map((from) => block[from] ?? 0);
-    }
-    const out = new DataView(new ArrayBuffer(32));
-    for (let i = 0; i < 8; i++) out.setUint32(4 * i, at(i) ^ at(i + 8), true);
-    return new Uint8Array(out.buffer);
-  }
-  var digits = (bytes2) => Array.from(bytes2, (byte) => byte.toString(16).padStart(2, "0")).join("");
-  var bytesOf = (text) => Uint8Array.from(text.match(/../g) ?? [], (pair) => parseInt(pair, 16));
-  function proof(secret2, side, viewers, pages) {
-    const bytes2 = [...new TextEncoder().encode(side), ...bytesOf(viewers).slice(0, 24), ...bytesOf(pages).slice(0, 24)];
-    return digits(keyedHash(bytesOf(secret2), Uint8Array.from(bytes2)));
-  }
-
-  // src/protocol.ts
-  var HEADER = 40;
-  var MAGIC = 843928908;
-  function decoded(packet) {
-    const numbers2 = new Uint32Array(packet, 0, HEADER / 4);
-    const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence = 0, flags = 0] = numbers2;
-    if (magic !== MAGIC || packet.byteLength !== HEADER + 4 * width * height) throw new Error("no frame");
-    const pixels = new ImageData(new Uint8ClampedArray(packet, HEADER), width, height);
-    const [low = 0, high = 0] = new Float32Array(packet, 32, 2);
-    const [isFull, isDone, isDenoised] = [1, 2, 4].map((bit) => (flags & bit) !== 0);
-    return { width, height, fullWidth, fullHeight, spp, sequence, isFull, isDone, isDenoised, low, high, pixels };
-  }
-
-  // src/connection.ts
-  var UNKNOWN = 4403;
-  var SECRET = "lumbre-session";
-  function secret() {
-    const token = /^#([0-9a-f]{64})$/.exec(location.hash)?.[1];
-    if (token) {
-      history.replaceState(null, "", location.pathname);
-      sessionStorage.setItem(SECRET, token);
-    }
-    return sessionStorage.getItem(SECRET);
-  }
-  var Connection = class {
-    constructor(listener2) {
-      this.listener = listener2;
-      setTimeout(() => this.connect());
-      addEventListener("hashchange", () => {
-        if (!secret()) return;
-        clearTimeout(this.again);
-        const before = this.socket;
-        this.connect();
-        before?.close();
-      });
-    }
-    listener;
-    socket;
-    wait = 500;
-    again = 0;
-    isIn = false;
-    requests = 0;
-    waiting = /* @__PURE__ */ new Map();
-    send(message) {
-      if (this.isIn && this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
-    }
-    /** An address for an errand, which works once. */
-    ticket(errand) {
-      if (!this.isIn) return Promise.reject(new Error("not connected"));
-      const request = ++this.requests;
-      return new Promise((found) => {
-        this.waiting.set(request, found);
-        this.send({ type: "ticket", request, errand });
-      });
-    }
-    connect() {
-      this.isIn = false;
-      const known = secret();
-      if (!known) {
-        this.listener.onStatus("refused");
-        return;
-      }
-      const socket = new WebSocket(`ws://${location.host}/socket`);
-      socket.binaryType = "arraybuffer";
-      this.socket = socket;
-      const nonce = digits(crypto.getRandomValues(new Uint8Array(32)));
-      let challenge = "";
-      const greet = (message) => {
-        if (message.type === "challenge" && !challenge && /^[0-9a-f]{64}$/.test(message.nonce)) {
-          challenge = message.nonce;
-          socket.send(JSON.stringify({ type: "hello", nonce, proof: proof(known, "page", challenge, nonce) }));
-          return true;
-        }
-        if (message.type !== "welcome" || !challenge || message.proof !== proof(known, "viewer", challenge, nonce)) return false;
-        if (message.session) sessionStorage.setItem(SECRET, message.session);
-        [this.isIn, this.wait] = [true, 500];
-        this.listener.onOpen(message.access);
-        return true;
-      };
-      const lost = (how) => {
-        if (this.socket !== socket) return;
-        [this.socket, this.isIn] = [void 0, false];
-        this.waiting.clear();
-        this.listener.onStatus(how);
-        this.again = setTimeout(() => this.connect(), this.wait);
-        this.wait = Math.min(this.wait * 1.5, 5e3);
-      };
-      socket.onclose = ({ code }) => lost(code === UNKNOWN ? "refused" : "gone");
-      socket.onmessage = (event) => {
-        if (this.socket !== socket) return;
-        if (!this.isIn) {
-          let isViewer = false;
-          try {
-            isViewer = typeof event.data === "string" && greet(JSON.parse(event.data));
-          } catch {
-          }
-          if (isViewer) return;
-          lost("foreign");
-          socket.close();
-          return;
-        }
-        if (typeof event.data === "string") {
-          const message = JSON.parse(event.data);
-          if (message.type === "ticket") {
-            this.waiting.get(message.request)?.(message.address);
-            this.waiting.delete(message.request);
-          } else {
-            this.listener.onMessage(message);
-          }
-          return;
-        }
-        this.listener.onFrame(decoded(event.data));
-        this.send({ type: "shown" });
-      };
-    }
-  };
-
   // src/elements.ts
   function byId(id) {
     const found = document.getElementById(id);
@@ -188,10 +24,10 @@
     if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
     return `${Math.floor(seconds / 60)} min ${Math.round(seconds % 60)} s`;
   }
-  function options(select2, entries, chosen) {
-    const same = select2.options.length === entries.length && entries.every(([value, text], i) => select2.options[i]?.value === value && select2.options[i]?.textContent === text);
-    if (!same) select2.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
-    select2.value = chosen;
+  function options(select, entries, chosen) {
+    const same = select.options.length === entries.length && entries.every(([value, text], i) => select.options[i]?.value === value && select.options[i]?.textContent === text);
+    if (!same) select.replaceChildren(...entries.map(([value, text]) => element("option", text, { value })));
+    select.value = chosen;
   }
   function saveBlob(name, blob) {
     const url = URL.createObjectURL(blob);
@@ -199,6 +35,10 @@
     setTimeout(() => URL.revokeObjectURL(url), 1e4);
   }
   var save = (name, text) => saveBlob(name, new Blob([text], { type: "text/plain" }));
+  function on(id, event, act) {
+    const input = byId(id);
+    input.addEventListener(event, () => act(input));
+  }
 
   // src/display.ts
   var LEVELS = 256;
@@ -250,7 +90,7 @@
       byId("map").value = state.map;
       byId("legend").className = `scaled map-${state.map === "automatic" ? state.channel === "depth" ? "near" : "rainbow" : state.map === "grey" && state.channel === "depth" ? "near" : state.map}`;
     }
-    /** What a frame says of itself. */
+    /** Shows the range and the histogram of the last frame. */
     draw() {
       const frame = this.last;
       if (!frame) return;
@@ -291,74 +131,6 @@
     }
   };
 
-  // src/drop.ts
-  var MOST_BYTES = 256 * 2 ** 20;
-  async function filesOf(entry) {
-    const name = entry.fullPath.slice(1);
-    if (entry.isFile) {
-      const file = await new Promise((found, failed) => entry.file(found, failed));
-      return [{ name, file }];
-    }
-    const reader = entry.createReader();
-    const all = [];
-    for (; ; ) {
-      const some = await new Promise((found, failed) => reader.readEntries(found, failed));
-      if (some.length === 0) return all;
-      for (const inner of some) all.push(...await filesOf(inner));
-    }
-  }
-  async function dropped(data2) {
-    const entries = [...data2.items].map((item) => item.webkitGetAsEntry?.() ?? null);
-    const plain = [...data2.files].map((file) => ({ name: file.name, file }));
-    if (entries.length === 0 || entries.some((entry) => entry === null)) return plain;
-    return (await Promise.all(entries.map((entry) => entry ? filesOf(entry) : []))).flat();
-  }
-  function bundled(files) {
-    const list = new TextEncoder().encode(JSON.stringify(files.map(({ name, file }) => ({ name, size: file.size }))));
-    const length2 = new DataView(new ArrayBuffer(4));
-    length2.setUint32(0, list.length, true);
-    return new Blob(["LUMF", length2, list, ...files.map(({ file }) => file)], { type: "application/octet-stream" });
-  }
-  var Drop = class {
-    constructor(ticket2, alert) {
-      this.ticket = ticket2;
-      this.alert = alert;
-      const stage = byId("stage");
-      stage.addEventListener("dragover", (event) => {
-        event.preventDefault();
-        stage.classList.add("over");
-      });
-      stage.addEventListener("dragleave", () => stage.classList.remove("over"));
-      stage.addEventListener("drop", (event) => {
-        event.preventDefault();
-        stage.classList.remove("over");
-        if (event.dataTransfer) void dropped(event.dataTransfer).then((files) => this.send(files));
-      });
-      for (const input of document.querySelectorAll("input.opens")) {
-        input.addEventListener("change", () => {
-          const files = [...input.files ?? []].map((file) => ({ name: file.webkitRelativePath || file.name, file }));
-          void this.send(files).then(() => input.value = "");
-        });
-      }
-    }
-    ticket;
-    alert;
-    async send(files) {
-      if (files.length === 0) return;
-      if (files.reduce((sum, { file }) => sum + file.size, 0) > MOST_BYTES) {
-        this.alert("The files were not opened.", "They are more than 256 MiB: open them from the command line.");
-        return;
-      }
-      try {
-        const headers = { "Content-Type": "application/octet-stream" };
-        const answer = await fetch(await this.ticket({ for: "scene" }), { method: "POST", headers, body: bundled(files) });
-        if (!answer.ok) this.alert("The files were not opened.", await answer.text());
-      } catch {
-        this.alert("The files were not opened.", "The viewer does not answer.");
-      }
-    }
-  };
-
   // src/colour.ts
   var toSrgb = (c) => c <= 31308e-7 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055;
   var toLinear = (c) => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
@@ -379,19 +151,19 @@
     return all.length === 1 ? [all[0] ?? 0, all[0] ?? 0, all[0] ?? 0] : all;
   }
   var LightList = class {
-    constructor(edit2) {
-      this.edit = edit2;
+    constructor(edit) {
+      this.edit = edit;
     }
     edit;
     panel = byId("lights");
     lights = [];
     settings = /* @__PURE__ */ new Map();
     list(parameters) {
-      const lights2 = parameters.filter(({ path, kind }) => kind === "light" || path === "light.area.scale");
-      if (JSON.stringify(lights2) === JSON.stringify(this.lights)) return;
-      this.lights = lights2;
+      const lights = parameters.filter(({ path, kind }) => kind === "light" || path === "light.area.scale");
+      if (JSON.stringify(lights) === JSON.stringify(this.lights)) return;
+      this.lights = lights;
       const none = element("p", "The scene has no light that can be set: the stage brings it.", { className: "quiet" });
-      this.panel.replaceChildren(...lights2.length > 0 ? lights2.map((light) => this.row(light)) : [none]);
+      this.panel.replaceChildren(...lights.length > 0 ? lights.map((light) => this.row(light)) : [none]);
     }
     take(settings) {
       this.settings = new Map(settings);
@@ -452,12 +224,12 @@
   };
 
   // src/edit.ts
-  var MOST = 60;
+  var MAX_LISTED = 60;
   var Editor = class {
-    constructor(panel, filter, edit2) {
+    constructor(panel, filter, edit) {
       this.panel = panel;
       this.filter = filter;
-      this.edit = edit2;
+      this.edit = edit;
       filter.addEventListener("input", () => this.draw());
     }
     panel;
@@ -497,7 +269,7 @@
       const wanted = this.filter.value.toLowerCase();
       const found = this.parameters.filter((p) => `${p.owner} ${p.name}`.toLowerCase().includes(wanted));
       const groups = /* @__PURE__ */ new Map();
-      for (const parameter of found.slice(0, MOST)) {
+      for (const parameter of found.slice(0, MAX_LISTED)) {
         let group = groups.get(parameter.owner);
         if (!group) {
           group = element("fieldset");
@@ -507,7 +279,7 @@
         }
         group.append(this.row(parameter));
       }
-      const rest = found.length - MOST;
+      const rest = found.length - MAX_LISTED;
       const more = rest > 0 ? [element("p", `${rest} more: find them by name.`, { className: "quiet" })] : [];
       const none = found.length === 0 ? [element("p", "No parameter has this name.", { className: "quiet" })] : [];
       this.panel.replaceChildren(...groups.values(), ...more, ...none);
@@ -563,8 +335,8 @@
 
   // src/explanation.ts
   var Explanation = class {
-    constructor(ticket2) {
-      this.ticket = ticket2;
+    constructor(ticket) {
+      this.ticket = ticket;
       this.button.addEventListener("click", () => this.show());
       this.language.addEventListener("change", () => void this.load());
       this.alone.addEventListener("click", () => setTimeout(() => void this.offerAlone()));
@@ -587,12 +359,12 @@
       options(this.language, languages, chosen);
       this.draw();
     }
-    /** It is this pixel that is asked about. */
+    /** Chooses the pixel to explain. */
     of(x, y) {
       this.pixel = [x, y];
       this.draw();
     }
-    /** Explains the pixel that was asked about. */
+    /** Shows the explanation of the chosen pixel. */
     show() {
       if (this.button.hidden) return;
       void this.load();
@@ -625,8 +397,590 @@
     }
   };
 
+  // src/vectors.ts
+  var add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+  var sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+  var scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
+  var dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  var cross = (a, b) => [
+    a[1] * b[2] - a[2] * b[1],
+    a[2] * b[0] - a[0] * b[2],
+    a[0] * b[1] - a[1] * b[0]
+  ];
+  var length = (a) => Math.hypot(...a);
+  var unit = (a) => scale(a, 1 / (length(a) || 1));
+  function turned(v, axis, angle) {
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
+  }
+
+  // src/measure.ts
+  var Measure = class {
+    constructor(sheet2) {
+      this.sheet = sheet2;
+      this.button.addEventListener("click", () => this.toggle());
+    }
+    sheet;
+    button = byId("measure");
+    points = [];
+    isOn = false;
+    toggle() {
+      this.isOn = !this.isOn;
+      this.points = [];
+      this.button.setAttribute("aria-pressed", String(this.isOn));
+      if (this.isOn) byId("measure-details").open = true;
+      this.draw();
+    }
+    /** Another point; a third one begins anew. */
+    take(x, y, hit) {
+      if (!this.isOn || !hit?.surface) return;
+      if (this.points.length >= 2) this.points = [];
+      this.points.push({ at: [x, y], point: hit.surface.point });
+      this.draw();
+    }
+    /** The picture shows the points elsewhere now. */
+    moved() {
+      this.sheet.mark([]);
+    }
+    draw() {
+      this.sheet.mark(this.points.map(({ at }) => at));
+      const [a, b] = this.points;
+      const rows = [];
+      if (a && b) {
+        const by = sub(b.point, a.point);
+        rows.push(["Distance", short(length(by))]);
+        rows.push(...by.map((value, i) => [`Along ${"xyz"[i]}`, short(value)]));
+      } else if (this.isOn) {
+        rows.push(["", a ? "Click on the second point." : "Click on the first point."]);
+      }
+      byId("measured").replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
+    }
+  };
+
+  // src/camera.ts
+  var POLE = 0.02;
+  var MIN_HEIGHT = 0.01;
+  var Camera = class {
+    placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
+    fov = null;
+    zoom = 1;
+    mirrored = false;
+    /** Whether it may go below the ground. */
+    mayGoBelow = false;
+    ground = null;
+    /** What stays upwards while the camera turns. */
+    axis = [0, 1, 0];
+    /** That of a state; what stays upwards is found anew. */
+    take(state, scene) {
+      if (!state.placement) return;
+      const own = scene.cameras[state.camera];
+      this.placement = state.placement;
+      this.mirrored = own?.mirrored ?? false;
+      this.fov = state.fov ?? own?.fov ?? null;
+      this.zoom = state.zoom;
+      this.axis = this.upright(scene, state.name.endsWith(".pbrt"));
+      this.ground = scene.ground;
+      if (this.height(this.placement.eye) < 0) this.mayGoBelow = true;
+    }
+    /** Stands there from now on. */
+    place(placement) {
+      this.placement = placement;
+      this.rise(false);
+    }
+    /** How far a point is above the ground; infinitely far without one. */
+    height(point2) {
+      return this.ground ? dot(sub(point2, this.ground.point), this.ground.normal) : Infinity;
+    }
+    /** Comes out of the ground, the target with the eye or alone. */
+    rise(withTarget) {
+      if (this.mayGoBelow || !this.ground) return;
+      const least = MIN_HEIGHT * this.distance();
+      const missing = least - this.height(this.placement.eye);
+      if (missing <= 0) return;
+      const step = scale(unit(this.ground.normal), missing);
+      const { eye, target, up } = this.placement;
+      this.placement = { eye: add(eye, step), target: withTarget ? add(target, step) : target, up };
+    }
+    /** What stays upwards while the camera turns. */
+    get upwards() {
+      return this.axis;
+    }
+    forward() {
+      return unit(sub(this.placement.target, this.placement.eye));
+    }
+    right() {
+      const right = unit(cross(this.placement.up, this.forward()));
+      return this.mirrored ? scale(right, -1) : right;
+    }
+    upward() {
+      const forward = this.forward();
+      return unit(sub(this.placement.up, scale(forward, dot(this.placement.up, forward))));
+    }
+    distance() {
+      return length(sub(this.placement.target, this.placement.eye));
+    }
+    /** An axis that the picture does not lean to the side of; pbrt files do not say which is up. */
+    upright(scene, unsaid) {
+      const [right, up] = [this.right(), this.upward()];
+      const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+      const candidates = [...axes, ...axes.map((axis) => scale(axis, -1)), scene.up];
+      let [best, most] = [up, 0];
+      for (const axis of candidates) {
+        const bonus = axis === scene.up && !unsaid ? 0.5 : 0;
+        const standing = dot(axis, up) + bonus;
+        if (Math.abs(dot(axis, right)) < 1e-3 && dot(axis, up) > 1e-3 && standing > most) [best, most] = [axis, standing];
+      }
+      return best;
+    }
+    /** Turns around the target by angles in radians: to the right, and up. */
+    orbit(right, up) {
+      let { eye, target } = this.placement;
+      let offset = sub(eye, target);
+      const sideways = Math.sign(dot(cross(this.axis, offset), this.right())) || 1;
+      offset = turned(offset, this.axis, right * sideways);
+      const polar = Math.acos(Math.max(-1, Math.min(1, dot(unit(offset), this.axis))));
+      const wanted = Math.max(POLE, Math.min(Math.PI - POLE, this.lowest(), polar - up));
+      const across = cross(this.axis, offset);
+      if (length(across) > 0) offset = turned(offset, unit(across), wanted - polar);
+      eye = add(target, offset);
+      this.placement = { eye, target, up: this.axis };
+      this.rise(false);
+    }
+    /** The largest angle from straight above at which the camera is above the ground, as far from its target as it is. */
+    lowest() {
+      const { ground } = this;
+      if (this.mayGoBelow || !ground || dot(unit(ground.normal), this.axis) < 0.999) return Math.PI;
+      const reach = this.distance();
+      const drop = (MIN_HEIGHT * reach - this.height(this.placement.target)) / reach;
+      return Math.acos(Math.max(-1, Math.min(1, drop)));
+    }
+    /** Moves eye and target: to the right, up and forward, in shares of the distance between them. */
+    move(right, up, forward) {
+      const by = this.distance();
+      const step = add(add(scale(this.right(), right * by), scale(this.upward(), up * by)), scale(this.forward(), forward * by));
+      const { eye, target } = this.placement;
+      this.placement = { eye: add(eye, step), target: add(target, step), up: this.axis };
+      this.rise(true);
+    }
+    /** Comes nearer to the target by a factor, or shows more of it. */
+    dolly(factor) {
+      const { eye, target } = this.placement;
+      this.placement = { eye: add(target, scale(sub(eye, target), factor)), target, up: this.axis };
+      this.rise(false);
+      this.zoom = Math.max(1e-4, Math.min(1e4, this.zoom / factor));
+    }
+    /** Turns around this point from now on. */
+    lookAt(point2) {
+      const { eye } = this.placement;
+      this.placement = { eye, target: point2, up: this.axis };
+    }
+    /** As pbrt writes it. */
+    toPbrt() {
+      const { eye, target } = this.placement;
+      const numbers2 = (v) => v.map((x) => +x.toPrecision(9)).join(" ");
+      const mirror = this.mirrored ? "Scale -1 1 1\n" : "";
+      const lens = this.fov === null ? "" : `
+Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
+      return `${mirror}LookAt ${numbers2(eye)}  ${numbers2(target)}  ${numbers2(this.upward())}${lens}`;
+    }
+    /** As glTF writes it: a node, whose camera looks along -z. */
+    toGltf(aspect) {
+      const columns = [
+        [this.right(), 0],
+        [this.upward(), 0],
+        [scale(this.forward(), -1), 0],
+        [this.placement.eye, 1]
+      ];
+      const matrix = columns.flatMap(([v, w]) => [...v.map((x) => +x.toPrecision(9)), w]);
+      const shorter = (this.fov ?? 45) * Math.PI / 180;
+      const yfov = aspect >= 1 ? shorter : 2 * Math.atan(Math.tan(shorter / 2) / aspect);
+      const perspective = { aspectRatio: +aspect.toPrecision(9), yfov: +yfov.toPrecision(9), znear: 0.01 };
+      return JSON.stringify({ cameras: [{ type: "perspective", perspective }], nodes: [{ camera: 0, matrix }] });
+    }
+  };
+
+  // src/sheet.ts
+  var MAX_ZOOM = 256;
+  var NUMBERS_FROM = 32;
+  function context(canvas) {
+    const found = canvas.getContext("2d", { willReadFrequently: false });
+    if (!found) throw new Error("this browser has no canvas");
+    return found;
+  }
+  var Sheet = class {
+    constructor(stage, sheet2, picture, reference, numbers2, marks) {
+      this.stage = stage;
+      this.sheet = sheet2;
+      this.picture = picture;
+      this.reference = reference;
+      this.numbers = numbers2;
+      this.marks = marks;
+      new ResizeObserver(() => this.place()).observe(stage);
+    }
+    stage;
+    sheet;
+    picture;
+    reference;
+    numbers;
+    marks;
+    width = 16;
+    height = 9;
+    /** Screen pixels a pixel; 0 fits the picture. */
+    zoom = 0;
+    left = 0;
+    top = 0;
+    /** Where the reference begins, in percent of the width. */
+    part = 50;
+    small = document.createElement("canvas");
+    changed = () => {
+    };
+    show(frame) {
+      const { fullWidth, fullHeight } = frame;
+      if (frame.isFull && (this.width !== frame.width || this.height !== frame.height)) this.size(frame.width, frame.height);
+      if (!frame.isFull && Math.abs(this.width / this.height - frame.width / frame.height) > 0.05) this.size(fullWidth, fullHeight);
+      const drawing = context(this.picture);
+      if (frame.width === this.width && frame.height === this.height) {
+        drawing.putImageData(frame.pixels, 0, 0);
+      } else {
+        if (this.small.width !== frame.width || this.small.height !== frame.height) {
+          [this.small.width, this.small.height] = [frame.width, frame.height];
+        }
+        context(this.small).putImageData(frame.pixels, 0, 0);
+        drawing.imageSmoothingQuality = "low";
+        drawing.clearRect(0, 0, this.width, this.height);
+        drawing.drawImage(this.small, 0, 0, this.width, this.height);
+      }
+    }
+    size(width, height) {
+      [this.width, this.height] = [width, height];
+      [this.picture.width, this.picture.height] = [width, height];
+      this.place();
+    }
+    fit() {
+      return Math.min(this.stage.clientWidth / this.width, this.stage.clientHeight / this.height);
+    }
+    /** Screen pixels a pixel. */
+    scale() {
+      return this.zoom || this.fit();
+    }
+    place() {
+      const scale2 = this.scale();
+      const [width, height] = [this.width * scale2, this.height * scale2];
+      const within = (at, size, room) => size <= room ? (room - size) / 2 : Math.min(0, Math.max(room - size, at));
+      this.left = within(this.left, width, this.stage.clientWidth);
+      this.top = within(this.top, height, this.stage.clientHeight);
+      const style = this.sheet.style;
+      [style.left, style.top, style.width, style.height] = [`${this.left}px`, `${this.top}px`, `${width}px`, `${height}px`];
+      this.sheet.classList.toggle("pixels", scale2 > 2);
+      this.clearNumbers();
+      this.changed();
+    }
+    /** Zooms about a place of the screen. */
+    zoomBy(factor, x = this.stage.clientWidth / 2, y = this.stage.clientHeight / 2) {
+      const before = this.scale();
+      const after = Math.min(MAX_ZOOM, before * factor);
+      this.zoom = after <= this.fit() ? 0 : after;
+      const ratio = this.scale() / before;
+      this.left = x - (x - this.left) * ratio;
+      this.top = y - (y - this.top) * ratio;
+      this.place();
+    }
+    zoomOut() {
+      this.zoom = 0;
+      this.place();
+    }
+    slide(x, y) {
+      this.left += x;
+      this.top += y;
+      this.place();
+    }
+    isZoomed() {
+      return this.zoom > 0;
+    }
+    /** The place in the picture, in pixels, of one on the screen; null outside. */
+    at(clientX, clientY) {
+      const box = this.stage.getBoundingClientRect();
+      const [x, y] = [(clientX - box.left - this.left) / this.scale(), (clientY - box.top - this.top) / this.scale()];
+      return x >= 0 && y >= 0 && x < this.width && y < this.height ? [x, y] : null;
+    }
+    /** The pixels whose numbers can be read: x, y, width, height. */
+    readable() {
+      const scale2 = this.scale();
+      if (scale2 < NUMBERS_FROM) return null;
+      const x = Math.max(0, Math.floor(-this.left / scale2));
+      const y = Math.max(0, Math.floor(-this.top / scale2));
+      const width = Math.min(64, this.width - x, Math.ceil(this.stage.clientWidth / scale2) + 1);
+      const height = Math.min(64, this.height - y, Math.ceil(this.stage.clientHeight / scale2) + 1);
+      return [x, y, width, height];
+    }
+    clearNumbers() {
+      if (this.numbers.width > 1) [this.numbers.width, this.numbers.height] = [1, 1];
+    }
+    writeNumbers(x0, y0, width, values) {
+      const scale2 = this.scale();
+      if (scale2 < NUMBERS_FROM) return;
+      const canvas = this.numbers;
+      const rows = Math.ceil(values.length / Math.max(1, width));
+      [canvas.width, canvas.height] = [Math.round(width * scale2), Math.round(rows * scale2)];
+      const style = canvas.style;
+      [style.left, style.top] = [`${x0 * scale2}px`, `${y0 * scale2}px`];
+      [style.width, style.height] = [`${canvas.width}px`, `${canvas.height}px`];
+      const drawing = context(canvas);
+      drawing.font = `${Math.max(8, Math.min(13, scale2 / 5))}px ui-monospace, monospace`;
+      drawing.textAlign = "center";
+      drawing.textBaseline = "middle";
+      const colours = ["#ff9a9a", "#9dffa6", "#a9c8ff"];
+      values.forEach((value, i) => {
+        const [x, y] = [(i % width + 0.5) * scale2, (Math.floor(i / width) + 0.5) * scale2];
+        value.forEach((number, channel) => {
+          const text = typeof number === "number" ? +number.toPrecision(3) + "" : number;
+          const at = y + (channel - 1) * scale2 * 0.25;
+          drawing.lineWidth = 3;
+          drawing.strokeStyle = "#000";
+          drawing.strokeText(text, x, at, scale2 - 2);
+          drawing.fillStyle = colours[channel] ?? "#fff";
+          drawing.fillText(text, x, at, scale2 - 2);
+        });
+      });
+    }
+    /** Marks places of the picture, and the line between two of them; none takes the marks away. */
+    mark(places) {
+      const svg = (name, attributes) => {
+        const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+        for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, String(value));
+        return made;
+      };
+      this.marks.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
+      const radius = 5 / this.scale();
+      const dots = places.map(([cx, cy]) => svg("circle", { cx, cy, r: radius }));
+      const [a, b] = places;
+      const line = a && b ? [svg("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] })] : [];
+      this.marks.replaceChildren(...line, ...dots);
+    }
+    /** What is shown, the reference too where it covers the picture, as a PNG. */
+    async snapshot() {
+      const canvas = document.createElement("canvas");
+      [canvas.width, canvas.height] = [this.width, this.height];
+      const drawing = context(canvas);
+      drawing.drawImage(this.picture, 0, 0);
+      if (!this.reference.hidden) {
+        const from = Math.round(this.width * this.part / 100);
+        const wide = this.width - from;
+        if (wide > 0) drawing.drawImage(this.reference, from, 0, wide, this.height, from, 0, wide, this.height);
+      }
+      return new Promise((found) => canvas.toBlob(found, "image/png"));
+    }
+    /** Keeps a picture to compare with; without one, what is shown. */
+    keep(source = this.picture) {
+      [this.reference.width, this.reference.height] = [this.width, this.height];
+      context(this.reference).drawImage(source, 0, 0, this.width, this.height);
+      this.reference.hidden = false;
+    }
+    split(percent) {
+      this.part = percent;
+      this.reference.style.clipPath = `inset(0 0 0 ${percent}%)`;
+    }
+  };
+
+  // src/page.ts
+  var MAX_TIMES = 2e3;
+  var measured = {
+    latencies: [],
+    frames: [],
+    changes: /* @__PURE__ */ new Map(),
+    spp: 0,
+    done: false,
+    sequence: 0,
+    /** When the first frame came, and the first without noise, by the clock of the page. */
+    first: 0,
+    firstDenoised: 0,
+    /** Frames with noise, since this was last set to 0. */
+    noisy: 0
+  };
+  Object.assign(globalThis, { lumbreMeasured: measured });
+  var Page = class {
+    sheet = new Sheet(
+      byId("stage"),
+      byId("sheet"),
+      byId("picture"),
+      byId("reference"),
+      byId("numbers"),
+      document.querySelector("#marks")
+    );
+    camera = new Camera();
+    scene;
+    state;
+    connection;
+    connected = false;
+    /** Whether it only watches. */
+    watches = false;
+    /** Called when the camera was moved by hand. */
+    onCamera = () => {
+    };
+    requests = 0;
+    isMoving = false;
+    // Changes of the camera are counted, so that a frame can say which it shows. Each page starts at its own number.
+    sequence = Math.floor(Math.random() * 2147418112);
+    mine = -1;
+    send(message) {
+      this.connection?.send(message);
+    }
+    /** An address for an errand, which works once. */
+    ticket(errand) {
+      return this.connection?.ticket(errand) ?? Promise.reject(new Error("not connected"));
+    }
+    /** Sends a question, and returns the number by which its answer is known. */
+    ask(question) {
+      this.requests += 1;
+      this.send({ ...question, request: this.requests });
+      return this.requests;
+    }
+    set(options2) {
+      this.send({ type: "set", ...options2 });
+    }
+    /** The camera was moved: it is sent once a frame of the screen. */
+    moved() {
+      if (this.watches) {
+        if (this.state && this.scene) this.camera.take(this.state, this.scene);
+        return;
+      }
+      this.onCamera();
+      if (this.isMoving) return;
+      this.isMoving = true;
+      requestAnimationFrame(() => {
+        this.isMoving = false;
+        this.sequence = this.sequence + 1 >>> 0;
+        this.mine = this.sequence;
+        measured.changes.set(this.sequence, performance.now());
+        const { placement, fov, zoom } = this.camera;
+        this.send({ type: "camera", sequence: this.sequence, placement, fov, zoom });
+      });
+    }
+    /** One of the file's cameras, as it is. */
+    reset(index) {
+      this.sequence = this.sequence + 1 >>> 0;
+      this.mine = -1;
+      this.onCamera();
+      this.send({ type: "reset", sequence: this.sequence, camera: index });
+    }
+    /** Takes the camera of the state, unless it was moved here: what comes back is older than what the hand does. */
+    takeCamera(state, scene) {
+      const isOwn = state.moved && state.sequence === this.mine;
+      if (!isOwn && !this.isMoving) this.camera.take(state, scene);
+    }
+    show(frame) {
+      this.sheet.show(frame);
+      const now = performance.now();
+      measured.frames.push(now);
+      if (measured.frames.length > MAX_TIMES) measured.frames.splice(0, MAX_TIMES / 2);
+      measured.first ||= now;
+      if (frame.isDenoised) measured.firstDenoised ||= now;
+      else measured.noisy += 1;
+      [measured.spp, measured.done, measured.sequence] = [frame.isFull ? frame.spp : 0, frame.isDone, frame.sequence];
+      for (const [change, since] of measured.changes) {
+        if (change > frame.sequence) continue;
+        if (change === frame.sequence) measured.latencies.push(now - since);
+        measured.changes.delete(change);
+      }
+    }
+  };
+
+  // src/pixels.ts
+  var PIXEL_EVERY = 40;
+  var NUMBERS_AFTER = 60;
+  var PixelReader = class {
+    constructor(page2) {
+      this.page = page2;
+      page2.sheet.changed = () => this.askNumbers();
+    }
+    page;
+    hovered = null;
+    lastAsked = 0;
+    timer = 0;
+    /** The pointer is at this place of the picture, or outside. */
+    hover(at) {
+      this.hovered = at;
+      if (at) this.askPixel();
+      else byId("pixel").textContent = "";
+    }
+    /** There is a new picture. */
+    refresh() {
+      this.askNumbers();
+      if (this.hovered) this.askPixel();
+    }
+    show({ x, y, width, height, values }) {
+      if (width !== 1 || height !== 1) {
+        this.page.sheet.writeNumbers(x, y, width, values);
+        return;
+      }
+      const [value] = values;
+      if (value) byId("pixel").textContent = `${x}, ${y}: ${value.map((v) => typeof v === "number" ? short(v) : v).join("  ")}`;
+    }
+    askPixel() {
+      const now = performance.now();
+      if (!this.hovered || now - this.lastAsked < PIXEL_EVERY) return;
+      this.lastAsked = now;
+      const [x, y] = this.hovered;
+      this.page.ask({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1 });
+    }
+    askNumbers() {
+      const rectangle = this.page.sheet.readable();
+      if (!rectangle) return;
+      clearTimeout(this.timer);
+      const [x, y, width, height] = rectangle;
+      this.timer = setTimeout(() => this.page.ask({ type: "values", x, y, width, height }), NUMBERS_AFTER);
+    }
+  };
+
+  // src/section.ts
+  var AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
+  var Section = class {
+    constructor(page2) {
+      this.page = page2;
+      this.axis.addEventListener("change", () => this.send());
+      this.place.addEventListener("input", () => this.send());
+      this.draw();
+    }
+    page;
+    axis = byId("section-axis");
+    place = byId("section-place");
+    shown = null;
+    take({ section }) {
+      this.shown = section;
+      if (!section && document.activeElement !== this.axis) this.axis.value = "none";
+      this.draw();
+    }
+    /** The camera was moved: what is on its side of the plane is cut away. */
+    moved() {
+      const plane = this.plane();
+      if (plane && this.shown && this.axis.value !== "view" && dot(plane.normal, this.shown.normal) < 0) this.send();
+    }
+    plane() {
+      const { camera: camera2, scene } = this.page;
+      const share = Number(this.place.value) / 100;
+      if (this.axis.value === "view") {
+        const point3 = add(camera2.placement.eye, scale(camera2.forward(), 2 * share * camera2.distance()));
+        return { point: point3, normal: scale(camera2.forward(), -1) };
+      }
+      const axis = AXES[this.axis.value];
+      if (!axis || !scene?.bounds) return null;
+      const [low, high] = scene.bounds;
+      const point2 = add(low, scale(sub(high, low), share));
+      const side = dot(sub(camera2.placement.eye, point2), axis) < 0 ? -1 : 1;
+      return { point: point2, normal: scale(axis, side) };
+    }
+    send() {
+      this.shown = this.plane();
+      this.page.send({ type: "section", plane: this.shown });
+      this.draw();
+    }
+    draw() {
+      this.place.disabled = this.axis.value === "none";
+    }
+  };
+
   // src/tree.ts
-  var MOST2 = 200;
+  var MAX_LISTED2 = 200;
   function called({ shape, kind, name }) {
     if (kind === "ground") return kind;
     return name ? `${name} (${kind})` : `${kind} ${shape}`;
@@ -693,7 +1047,7 @@
       const wanted = this.filter.value.toLowerCase();
       const { groups = [], left_out = 0 } = this.scene?.tree ?? {};
       const isWanted = (thing, group) => `${group ?? ""} ${called(thing)} ${thing.material ?? ""}`.toLowerCase().includes(wanted);
-      let left = MOST2;
+      let left = MAX_LISTED2;
       let rest = left_out;
       const parts = groups.flatMap(({ name, shapes }) => {
         const found = shapes.filter((thing) => isWanted(thing, name));
@@ -716,9 +1070,9 @@
       const row = element("li");
       row.dataset["shape"] = String(thing.shape);
       const name = called(thing);
-      const select2 = element("button", name, { className: "select" });
-      select2.append(element("span", thing.material ?? "no material", { className: "quiet" }));
-      select2.addEventListener("click", () => {
+      const select = element("button", name, { className: "select" });
+      select.append(element("span", thing.material ?? "no material", { className: "quiet" }));
+      select.addEventListener("click", () => {
         this.select(thing.shape);
         this.onSelect(thing);
       });
@@ -728,7 +1082,7 @@
       const isolate = element("button", "Only", { className: "isolate" });
       isolate.setAttribute("aria-label", `Only ${name}`);
       isolate.addEventListener("click", () => this.isolate(thing.shape));
-      row.append(select2, hide, isolate);
+      row.append(select, hide, isolate);
       this.mark(row);
       return row;
     }
@@ -747,62 +1101,452 @@
     }
   };
 
-  // src/facts.ts
-  var point = (v) => v.map(short).join(", ");
-  function showFacts(list, warnings, scene) {
-    const counted = (kinds) => Object.entries(kinds).map(([name, count]) => `${count} ${name}`).join(", ") || "none";
-    const rows = [
-      ["Shapes", counted(scene.shapes)],
-      ["Triangles", large(scene.triangles)],
-      ["Instances", large(scene.instances)],
-      ["Materials", counted(scene.materials)],
-      ["Lights", counted(scene.lights)],
-      ["Bounds", scene.bounds ? `${point(scene.bounds[0])} to ${point(scene.bounds[1])}` : "none"],
-      ["Memory", `${large(scene.memory)}B`],
-      ["Built in", spoken(scene.build_seconds)]
-    ];
-    list.replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
-    warnings.replaceChildren();
-    if (scene.warnings.length > 0) {
-      warnings.append(element("p", `${scene.warnings.length} warnings`, { className: "quiet" }));
-      warnings.append(element("pre", scene.warnings.join("\n"), { tabIndex: 0 }));
+  // src/views.ts
+  var OPPOSITE = { front: "back", back: "front", right: "left", left: "right", top: "bottom", bottom: "top" };
+  var TILT = 2e-3;
+  function sides(up) {
+    const y = [0, 1, 0];
+    const z = [0, 0, 1];
+    const n = unit(up);
+    const c = dot(y, n);
+    const axis = cross(y, n);
+    const front = c < -1 + 1e-9 ? [0, 0, -1] : add(add(scale(z, c), cross(axis, z)), scale(axis, dot(axis, z) / (1 + c)));
+    return { front: unit(front), right: unit(cross(n, front)) };
+  }
+  var Views = class {
+    constructor(page2, camera2) {
+      this.page = page2;
+      this.camera = camera2;
+      for (const button of document.querySelectorAll("button[data-view]")) {
+        button.addEventListener("click", () => this.show(button.dataset["view"]));
+      }
+      byId("keep-view").addEventListener("click", () => this.keep());
+    }
+    page;
+    camera;
+    kept = [];
+    sceneName = "";
+    /** The views that were kept of a scene. */
+    open(name) {
+      if (name === this.sceneName) return;
+      this.sceneName = name;
+      this.kept = JSON.parse(sessionStorage.getItem(this.key) ?? "[]");
+      this.draw();
+    }
+    /** All of the scene from one of its sides. */
+    show(side) {
+      const { scene } = this.page;
+      if (!scene?.bounds) return;
+      const [low, high] = scene.bounds;
+      const up = unit(this.camera.upwards);
+      const { front, right } = sides(up);
+      const above = unit(add(up, scale(front, TILT)));
+      const below = unit(add(scale(up, -1), scale(front, TILT)));
+      const from = { front, back: scale(front, -1), right, left: scale(right, -1), top: above, bottom: below };
+      const target = scale(add(low, high), 0.5);
+      const radius = 0.5 * length(sub(high, low)) || 1;
+      const half2 = (this.camera.fov ?? 45) * Math.PI / 360;
+      const eye = add(target, scale(from[side], 1.05 * radius / Math.sin(half2)));
+      if (side === "bottom") this.camera.mayGoBelow = true;
+      this.camera.place({ eye, target, up });
+      this.page.moved();
+    }
+    /** From the other side. */
+    turn() {
+      const { eye, target, up } = this.camera.placement;
+      this.camera.place({ eye: sub(scale(target, 2), eye), target, up });
+      this.page.moved();
+    }
+    static opposite(side) {
+      return OPPOSITE[side];
+    }
+    get key() {
+      return `lumbre-views:${this.sceneName}`;
+    }
+    keep() {
+      const input = byId("view-name");
+      const { placement, fov, zoom } = this.camera;
+      this.kept.push({ name: input.value.trim() || `View ${this.kept.length + 1}`, placement, fov, zoom });
+      input.value = "";
+      this.store();
+    }
+    store() {
+      sessionStorage.setItem(this.key, JSON.stringify(this.kept));
+      this.draw();
+    }
+    draw() {
+      const rows = this.kept.map((view, i) => {
+        const row = element("li");
+        const show = element("button", view.name, { className: "select" });
+        show.addEventListener("click", () => {
+          [this.camera.fov, this.camera.zoom] = [view.fov, view.zoom];
+          this.camera.place(view.placement);
+          this.page.moved();
+        });
+        const drop = element("button", "Remove");
+        drop.setAttribute("aria-label", `Remove ${view.name}`);
+        drop.addEventListener("click", () => {
+          this.kept.splice(i, 1);
+          this.store();
+        });
+        row.append(show, drop);
+        return row;
+      });
+      byId("kept-views").replaceChildren(...rows);
+    }
+  };
+
+  // src/app.ts
+  var App = class {
+    /** `isStatic`: the page was exported, and there is no viewer. */
+    constructor(isStatic) {
+      this.isStatic = isStatic;
+      const edit = (path, value) => this.page.send({ type: "edit", path, value });
+      this.editor = new Editor(byId("parameters"), byId("filter"), edit);
+      this.lights = new LightList(edit);
+      this.page.onCamera = () => {
+        this.measure.moved();
+        this.section.moved();
+      };
+    }
+    isStatic;
+    page = new Page();
+    sheet = this.page.sheet;
+    camera = this.page.camera;
+    pixels = new PixelReader(this.page);
+    explanation = new Explanation((errand) => this.page.ticket(errand));
+    editor;
+    lights;
+    tree = new SceneTree(this.page, (shape) => this.select(shape));
+    views = new Views(this.page, this.camera);
+    measure = new Measure(this.sheet);
+    section = new Section(this.page);
+    display = new Display(this.page);
+    /** What was clicked last. */
+    picked;
+    /** The question whose answer the camera turns around from then on. */
+    orbitOnPick = 0;
+    /** A shape was clicked, in the picture or in the tree: it is marked everywhere. */
+    select(shape) {
+      this.picked = shape;
+      this.tree.select(shape?.shape ?? -1);
+      this.editor.mark(shape?.owner ?? null);
+      const isShape = shape !== void 0 && shape.kind !== "ground";
+      byId("picked-buttons").hidden = !isShape || this.isStatic || this.page.watches;
+      byId("edit-picked").hidden = !shape?.owner;
+      byId("light-picked").hidden = !shape?.shines;
+    }
+    /** A fault above the picture; an empty title takes it away. */
+    alert(title, text) {
+      byId("alert-title").textContent = title;
+      byId("alert-text").textContent = text;
+      byId("alert").hidden = title === "";
+    }
+  };
+
+  // src/compare.ts
+  function connectComparing({ sheet: sheet2, alert }) {
+    const compare = (is) => {
+      byId("split").disabled = !is;
+      byId("forget").disabled = !is;
+      sheet2.reference.hidden = !is;
+      if (is) sheet2.split(Number(byId("split").value));
+    };
+    on("keep", "click", () => {
+      sheet2.keep();
+      compare(true);
+    });
+    on("forget", "click", () => compare(false));
+    on("split", "input", ({ value }) => sheet2.split(Number(value)));
+    on("reference-file", "change", async ({ files }) => {
+      const file = files?.[0];
+      if (!file) return;
+      try {
+        sheet2.keep(await createImageBitmap(file));
+        compare(true);
+      } catch {
+        alert("This is no picture that a browser can show.", file.name);
+      }
+    });
+  }
+
+  // src/frame.ts
+  var HEADER = 40;
+  var MAGIC = 843928908;
+  function decoded(packet) {
+    const numbers2 = new Uint32Array(packet, 0, HEADER / 4);
+    const [magic = 0, width = 0, height = 0, fullWidth = 0, fullHeight = 0, spp = 0, sequence = 0, flags = 0] = numbers2;
+    if (magic !== MAGIC || packet.byteLength !== HEADER + 4 * width * height) throw new Error("no frame");
+    const pixels = new ImageData(new Uint8ClampedArray(packet, HEADER), width, height);
+    const [low = 0, high = 0] = new Float32Array(packet, 32, 2);
+    const [isFull, isDone, isDenoised] = [1, 2, 4].map((bit) => (flags & bit) !== 0);
+    return { width, height, fullWidth, fullHeight, spp, sequence, isFull, isDone, isDenoised, low, high, pixels };
+  }
+
+  // src/proof.ts
+  var IV = [1779033703, 3144134277, 1013904242, 2773480762, 1359893119, 2600822924, 528734635, 1541459225];
+  var ORDER = [2, 6, 3, 10, 7, 0, 4, 13, 1, 11, 12, 5, 9, 14, 15, 8];
+  var QUARTERS = [
+    [0, 4, 8, 12],
+    [1, 5, 9, 13],
+    [2, 6, 10, 14],
+    [3, 7, 11, 15],
+    [0, 5, 10, 15],
+    [1, 6, 11, 12],
+    [2, 7, 8, 13],
+    [3, 4, 9, 14]
+  ];
+  var FLAGS = 1 | 2 | 8 | 16;
+  var BLOCK = 64;
+  function keyedHash(key, bytes2) {
+    if (key.length !== 32 || bytes2.length > BLOCK) throw new Error("one block and a key of 32 bytes");
+    const words = (of, count) => {
+      const view = new DataView(Uint8Array.from({ length: 4 * count }, (_, i) => of[i] ?? 0).buffer);
+      return Array.from({ length: count }, (_, i) => view.getUint32(4 * i, true));
+    };
+    const v = Uint32Array.from([...words(key, 8), ...IV.slice(0, 4), 0, 0, bytes2.length, FLAGS]);
+    const at = (i) => v[i] ?? 0;
+    const turned2 = (x, by) => x >>> by | x << 32 - by;
+    let block = words(bytes2, 16);
+    for (let round = 0; round < 7; round++) {
+      QUARTERS.forEach(([a, b, c, d], quarter) => {
+        for (const [which, first, second] of [[0, 16, 12], [1, 8, 7]]) {
+          v[a] = at(a) + at(b) + (block[2 * quarter + which] ?? 0);
+          v[d] = turned2(at(d) ^ at(a), first);
+          v[c] = at(c) + at(d);
+          v[b] = turned2(at(b) ^ at(c), second);
+        }
+      });
+      block = ORDER.map((from) => block[from] ?? 0);
+    }
+    const out = new DataView(new ArrayBuffer(32));
+    for (let i = 0; i < 8; i++) out.setUint32(4 * i, at(i) ^ at(i + 8), true);
+    return new Uint8Array(out.buffer);
+  }
+  var digits = (bytes2) => Array.from(bytes2, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  var bytesOf = (text) => Uint8Array.from(text.match(/../g) ?? [], (pair) => parseInt(pair, 16));
+  function proof(secret2, side, viewers, pages) {
+    const bytes2 = [...new TextEncoder().encode(side), ...bytesOf(viewers).slice(0, 24), ...bytesOf(pages).slice(0, 24)];
+    return digits(keyedHash(bytesOf(secret2), Uint8Array.from(bytes2)));
+  }
+
+  // src/connection.ts
+  var UNKNOWN = 4403;
+  var SECRET = "lumbre-session";
+  function secret() {
+    const token = /^#([0-9a-f]{64})$/.exec(location.hash)?.[1];
+    if (token) {
+      history.replaceState(null, "", location.pathname);
+      sessionStorage.setItem(SECRET, token);
+    }
+    return sessionStorage.getItem(SECRET);
+  }
+  var Connection = class {
+    constructor(listener) {
+      this.listener = listener;
+      setTimeout(() => this.connect());
+      addEventListener("hashchange", () => {
+        if (!secret()) return;
+        clearTimeout(this.again);
+        const before = this.socket;
+        this.connect();
+        before?.close();
+      });
+    }
+    listener;
+    socket;
+    wait = 500;
+    again = 0;
+    isIn = false;
+    requests = 0;
+    waiting = /* @__PURE__ */ new Map();
+    send(message) {
+      if (this.isIn && this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+    }
+    /** An address for an errand, which works once. */
+    ticket(errand) {
+      if (!this.isIn) return Promise.reject(new Error("not connected"));
+      const request = ++this.requests;
+      return new Promise((found, failed) => {
+        this.waiting.set(request, (address) => address === null ? failed(new Error("no address")) : found(address));
+        this.send({ type: "ticket", request, errand });
+      });
+    }
+    connect() {
+      this.isIn = false;
+      const known = secret();
+      if (!known) {
+        this.listener.onStatus("refused");
+        return;
+      }
+      const socket = new WebSocket(`ws://${location.host}/socket`);
+      socket.binaryType = "arraybuffer";
+      this.socket = socket;
+      const nonce = digits(crypto.getRandomValues(new Uint8Array(32)));
+      let challenge = "";
+      const greet = (message) => {
+        if (message.type === "challenge" && !challenge && /^[0-9a-f]{64}$/.test(message.nonce)) {
+          challenge = message.nonce;
+          const hello = { type: "hello", nonce, proof: proof(known, "page", challenge, nonce) };
+          socket.send(JSON.stringify(hello));
+          return true;
+        }
+        if (message.type !== "welcome" || !challenge || message.proof !== proof(known, "viewer", challenge, nonce)) return false;
+        if (message.session) sessionStorage.setItem(SECRET, message.session);
+        [this.isIn, this.wait] = [true, 500];
+        this.listener.onOpen(message.access);
+        return true;
+      };
+      const lost = (how) => {
+        if (this.socket !== socket) return;
+        [this.socket, this.isIn] = [void 0, false];
+        this.waiting.clear();
+        this.listener.onStatus(how);
+        this.again = setTimeout(() => this.connect(), this.wait);
+        this.wait = Math.min(this.wait * 1.5, 5e3);
+      };
+      socket.onclose = ({ code }) => lost(code === UNKNOWN ? "refused" : "gone");
+      socket.onmessage = (event) => {
+        if (this.socket !== socket) return;
+        if (!this.isIn) {
+          let isViewer = false;
+          try {
+            isViewer = typeof event.data === "string" && greet(JSON.parse(event.data));
+          } catch {
+          }
+          if (isViewer) return;
+          lost("foreign");
+          socket.close();
+          return;
+        }
+        if (typeof event.data === "string") {
+          const message = JSON.parse(event.data);
+          if (message.type === "ticket") {
+            this.waiting.get(message.request)?.(message.address);
+            this.waiting.delete(message.request);
+          } else {
+            this.listener.onMessage(message);
+          }
+          return;
+        }
+        this.listener.onFrame(decoded(event.data));
+        this.send({ type: "shown" });
+      };
+    }
+  };
+
+  // src/controls.ts
+  function connectControls(app2) {
+    const { page: page2 } = app2;
+    on("pause", "click", () => page2.set({ paused: !page2.state?.paused }));
+    on("reset", "click", () => page2.reset(page2.state?.camera ?? 0));
+    on("help-open", "click", () => byId("help").showModal());
+    on("help-close", "click", () => byId("help").close());
+    on("channel", "change", ({ value }) => page2.set({ channel: value }));
+    on("exposure", "input", ({ value }) => page2.set({ exposure: Number(value) }));
+    on("tone-map", "change", ({ value }) => page2.set({ tone_map: value }));
+    on("false-colour", "change", ({ checked }) => page2.set({ false_colour: checked }));
+    on("denoise", "change", ({ checked }) => page2.set({ denoise: checked }));
+    on("scale", "change", ({ value }) => page2.set({ scale: Number(value) }));
+    on("noise-target", "change", (input) => input.checkValidity() && page2.set({ noise: Number(input.value) }));
+    on("spp", "change", (input) => input.checkValidity() && page2.set({ spp: Number(input.value) }));
+    connectPicked(app2);
+    connectCamera(app2);
+    connectMoment(app2);
+  }
+  function connectPicked(app2) {
+    const { editor, lights, tree } = app2;
+    on("edit-picked", "click", () => app2.picked?.owner && editor.reveal(app2.picked.owner));
+    on("light-picked", "click", () => lights.reveal(app2.picked?.owner ?? null));
+    on("find-picked", "click", () => app2.picked && tree.reveal(app2.picked.shape));
+    on("hide-picked", "click", () => app2.picked && tree.hide(app2.picked.shape));
+    on("isolate-picked", "click", () => app2.picked && tree.isolate(app2.picked.shape));
+  }
+  function connectCamera({ page: page2, camera: camera2 }) {
+    on("below-ground", "change", ({ checked }) => {
+      camera2.mayGoBelow = checked;
+    });
+    on("camera", "change", ({ value }) => page2.reset(Number(value)));
+    on("fov", "change", (input) => {
+      if (!input.checkValidity()) return;
+      camera2.fov = Number(input.value);
+      page2.moved();
+    });
+  }
+  function connectMoment({ page: page2 }) {
+    const send = (changed) => page2.send({ type: "moment", time: page2.state?.time ?? null, variant: page2.state?.variant ?? null, ...changed });
+    on("animation-time", "input", ({ value }) => send({ time: Number(value) }));
+    on("variant", "change", ({ value }) => send({ variant: value || null }));
+  }
+
+  // src/drop.ts
+  var MAX_BYTES = 256 * 2 ** 20;
+  async function filesOf(entry) {
+    const name = entry.fullPath.slice(1);
+    if (entry.isFile) {
+      const file = await new Promise((found, failed) => entry.file(found, failed));
+      return [{ name, file }];
+    }
+    const reader = entry.createReader();
+    const all = [];
+    for (; ; ) {
+      const some = await new Promise((found, failed) => reader.readEntries(found, failed));
+      if (some.length === 0) return all;
+      for (const inner of some) all.push(...await filesOf(inner));
     }
   }
-  function showHits(panel, hits) {
-    const first = hits[0];
-    if (!first) {
-      panel.replaceChildren(element("p", "Nothing is there.", { className: "quiet" }));
-      return;
-    }
-    const rows = [
-      ["Shape", called(first)],
-      ["Material", first.material ?? "none"],
-      ["Position", first.point && point(first.point)],
-      ["Normal", first.normal && point(first.normal)],
-      ["Distance", short(first.distance)],
-      ["uv", first.uv && point(first.uv)],
-      ["Triangle", first.kind === "mesh" ? first.primitive?.toString() : void 0],
-      ["Instance", first.instance === null ? "none" : first.instance?.toString()],
-      ["Side", first.front === void 0 ? void 0 : first.front ? "outside" : "inside"]
-    ];
-    const table = element("table");
-    for (const [name, text] of rows) {
-      if (text === void 0) continue;
-      const row = element("tr");
-      row.append(element("th", name, { scope: "row" }), element("td", text));
-      table.append(row);
-    }
-    panel.replaceChildren(table);
-    if (first.front === void 0) return;
-    const all = element("details");
-    all.append(element("summary", `All ${hits.length} hits of this ray`));
-    const list = element("ol");
-    for (const hit of hits) {
-      list.append(element("li", `${short(hit.distance)}: shape ${called(hit)}, ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
-    }
-    all.append(list);
-    panel.append(all);
+  async function dropped(data2) {
+    const entries = [...data2.items].map((item) => item.webkitGetAsEntry?.() ?? null);
+    const plain = [...data2.files].map((file) => ({ name: file.name, file }));
+    if (entries.length === 0 || entries.some((entry) => entry === null)) return plain;
+    return (await Promise.all(entries.map((entry) => entry ? filesOf(entry) : []))).flat();
   }
+  function bundled(files) {
+    const entries = files.map(({ name, file }) => ({ name, size: file.size }));
+    const list = new TextEncoder().encode(JSON.stringify(entries));
+    const length2 = new DataView(new ArrayBuffer(4));
+    length2.setUint32(0, list.length, true);
+    return new Blob(["LUMF", length2, list, ...files.map(({ file }) => file)], { type: "application/octet-stream" });
+  }
+  var Drop = class {
+    constructor(ticket, alert) {
+      this.ticket = ticket;
+      this.alert = alert;
+      const stage = byId("stage");
+      stage.addEventListener("dragover", (event) => {
+        event.preventDefault();
+        stage.classList.add("over");
+      });
+      stage.addEventListener("dragleave", () => stage.classList.remove("over"));
+      stage.addEventListener("drop", (event) => {
+        event.preventDefault();
+        stage.classList.remove("over");
+        if (event.dataTransfer) void dropped(event.dataTransfer).then((files) => this.send(files));
+      });
+      for (const input of document.querySelectorAll("input.opens")) {
+        input.addEventListener("change", () => {
+          const files = [...input.files ?? []].map((file) => ({ name: file.webkitRelativePath || file.name, file }));
+          void this.send(files).then(() => input.value = "");
+        });
+      }
+    }
+    ticket;
+    alert;
+    async send(files) {
+      if (files.length === 0) return;
+      if (files.reduce((sum, { file }) => sum + file.size, 0) > MAX_BYTES) {
+        this.alert("The files were not opened.", "They are more than 256 MiB: open them from the command line.");
+        return;
+      }
+      try {
+        const headers = { "Content-Type": "application/octet-stream" };
+        const answer = await fetch(await this.ticket({ for: "scene" }), { method: "POST", headers, body: bundled(files) });
+        if (!answer.ok) this.alert("The files were not opened.", await answer.text());
+      } catch {
+        this.alert("The files were not opened.", "The viewer does not answer.");
+      }
+    }
+  };
 
   // src/hands.ts
   var STILL = 4;
@@ -900,13 +1644,13 @@
       last = now;
       const fast = held.has("shift") ? 4 : 1;
       let any = false;
-      for (const key2 of held) {
-        const [step, turn] = [FLY[key2], TURN[key2]];
+      for (const key of held) {
+        const [step, turn] = [FLY[key], TURN[key]];
         const by = seconds * 0.8 * fast;
         if (step) camera2.move(step[0] * by, step[1] * by, step[2] * by);
         if (turn) camera2.orbit(turn[0] * by, turn[1] * by);
-        if (key2 === "pageup" || key2 === "pagedown") camera2.dolly(Math.exp(key2 === "pageup" ? -by : by));
-        any ||= key2 !== "shift";
+        if (key === "pageup" || key === "pagedown") camera2.dolly(Math.exp(key === "pageup" ? -by : by));
+        any ||= key !== "shift";
       }
       if (any) handlers.moved();
       requestAnimationFrame(fly);
@@ -917,15 +1661,15 @@
         if (handlers.key(event)) event.preventDefault();
         return;
       }
-      const key2 = event.key.toLowerCase();
-      if (key2 in FLY || key2 in TURN || key2 === "pageup" || key2 === "pagedown" || key2 === "shift") {
+      const key = event.key.toLowerCase();
+      if (key in FLY || key in TURN || key === "pageup" || key === "pagedown" || key === "shift") {
         event.preventDefault();
         if (held.size === 0) {
           last = performance.now() - 16;
           requestAnimationFrame(fly);
         }
-        held.add(key2);
-      } else if (key2 === "enter") {
+        held.add(key);
+      } else if (key === "enter") {
         handlers.pick(sheet2.width / 2, sheet2.height / 2, false);
       } else if (handlers.key(event)) {
         event.preventDefault();
@@ -935,489 +1679,63 @@
     canvas.addEventListener("blur", () => held.clear());
   }
 
-  // src/vectors.ts
-  var add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
-  var sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-  var scale = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
-  var dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  var cross = (a, b) => [
-    a[1] * b[2] - a[2] * b[1],
-    a[2] * b[0] - a[0] * b[2],
-    a[0] * b[1] - a[1] * b[0]
-  ];
-  var length = (a) => Math.hypot(...a);
-  var unit = (a) => scale(a, 1 / (length(a) || 1));
-  function turned(v, axis, angle) {
-    const [c, s] = [Math.cos(angle), Math.sin(angle)];
-    return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
+  // src/facts.ts
+  var point = (v) => v.map(short).join(", ");
+  function showFacts(list, warnings, scene) {
+    const counted = (kinds) => Object.entries(kinds).map(([name, count]) => `${count} ${name}`).join(", ") || "none";
+    const rows = [
+      ["Shapes", counted(scene.shapes)],
+      ["Triangles", large(scene.triangles)],
+      ["Instances", large(scene.instances)],
+      ["Materials", counted(scene.materials)],
+      ["Lights", counted(scene.lights)],
+      ["Bounds", scene.bounds ? `${point(scene.bounds[0])} to ${point(scene.bounds[1])}` : "none"],
+      ["Memory", `${large(scene.memory)}B`],
+      ["Built in", spoken(scene.build_seconds)]
+    ];
+    list.replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
+    warnings.replaceChildren();
+    if (scene.warnings.length > 0) {
+      warnings.append(element("p", `${scene.warnings.length} warnings`, { className: "quiet" }));
+      warnings.append(element("pre", scene.warnings.join("\n"), { tabIndex: 0 }));
+    }
   }
-
-  // src/measure.ts
-  var Measure = class {
-    constructor(sheet2) {
-      this.sheet = sheet2;
-      this.button.addEventListener("click", () => this.toggle());
+  function showHits(panel, hits) {
+    const first = hits[0];
+    if (!first) {
+      panel.replaceChildren(element("p", "Nothing is there.", { className: "quiet" }));
+      return;
     }
-    sheet;
-    button = byId("measure");
-    points = [];
-    isOn = false;
-    toggle() {
-      this.isOn = !this.isOn;
-      this.points = [];
-      this.button.setAttribute("aria-pressed", String(this.isOn));
-      if (this.isOn) byId("measure-details").open = true;
-      this.draw();
+    const { surface } = first;
+    const rows = [
+      ["Shape", called(first)],
+      ["Material", first.material ?? "none"],
+      ["Position", surface ? point(surface.point) : void 0],
+      ["Normal", surface ? point(surface.normal) : void 0],
+      ["Distance", short(first.distance)],
+      ["uv", surface ? point(surface.uv) : void 0],
+      ["Triangle", surface && first.kind === "mesh" ? String(surface.primitive) : void 0],
+      ["Instance", surface ? String(surface.instance ?? "none") : void 0],
+      ["Side", surface ? surface.front ? "outside" : "inside" : void 0]
+    ];
+    const table = element("table");
+    for (const [name, text] of rows) {
+      if (text === void 0) continue;
+      const row = element("tr");
+      row.append(element("th", name, { scope: "row" }), element("td", text));
+      table.append(row);
     }
-    /** Another point; a third one begins anew. */
-    take(x, y, hit) {
-      if (!this.isOn || !hit?.point) return;
-      if (this.points.length >= 2) this.points = [];
-      this.points.push({ at: [x, y], point: hit.point });
-      this.draw();
+    panel.replaceChildren(table);
+    if (!surface) return;
+    const all = element("details");
+    all.append(element("summary", `All ${hits.length} hits of this ray`));
+    const list = element("ol");
+    for (const hit of hits) {
+      list.append(element("li", `${short(hit.distance)}: shape ${called(hit)}, ${hit.material ?? "no material"}, ${hit.surface?.front ? "in" : "out"}`));
     }
-    /** The picture shows the points elsewhere now. */
-    moved() {
-      this.sheet.mark([]);
-    }
-    draw() {
-      this.sheet.mark(this.points.map(({ at }) => at));
-      const [a, b] = this.points;
-      const rows = [];
-      if (a && b) {
-        const by = sub(b.point, a.point);
-        rows.push(["Distance", short(length(by))]);
-        rows.push(...by.map((value, i) => [`Along ${"xyz"[i]}`, short(value)]));
-      } else if (this.isOn) {
-        rows.push(["", a ? "Click on the second point." : "Click on the first point."]);
-      }
-      byId("measured").replaceChildren(...rows.flatMap(([name, text]) => [element("dt", name), element("dd", text)]));
-    }
-  };
-
-  // src/camera.ts
-  var POLE = 0.02;
-  var LEAST_HEIGHT = 0.01;
-  var Camera = class {
-    placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
-    fov = null;
-    zoom = 1;
-    mirrored = false;
-    /** Whether it may go below the ground. */
-    mayGoBelow = false;
-    ground = null;
-    /** What stays upwards while the camera turns. */
-    axis = [0, 1, 0];
-    /** That of a state; what stays upwards is found anew. */
-    take(state, scene) {
-      if (!state.placement) return;
-      const own = scene.cameras[state.camera];
-      this.placement = state.placement;
-      this.mirrored = own?.mirrored ?? false;
-      this.fov = state.fov ?? own?.fov ?? null;
-      this.zoom = state.zoom;
-      this.axis = this.upright(scene, state.name.endsWith(".pbrt"));
-      this.ground = scene.ground;
-      if (this.height(this.placement.eye) < 0) this.mayGoBelow = true;
-    }
-    /** Stands there from now on. */
-    place(placement) {
-      this.placement = placement;
-      this.rise(false);
-    }
-    /** How far a point is above the ground; infinitely far without one. */
-    height(point2) {
-      return this.ground ? dot(sub(point2, this.ground.point), this.ground.normal) : Infinity;
-    }
-    /** Comes out of the ground, the target with the eye or alone. */
-    rise(withTarget) {
-      if (this.mayGoBelow || !this.ground) return;
-      const least = LEAST_HEIGHT * this.distance();
-      const missing = least - this.height(this.placement.eye);
-      if (missing <= 0) return;
-      const step = scale(unit(this.ground.normal), missing);
-      const { eye, target, up } = this.placement;
-      this.placement = { eye: add(eye, step), target: withTarget ? add(target, step) : target, up };
-    }
-    /** What stays upwards while the camera turns. */
-    get upwards() {
-      return this.axis;
-    }
-    forward() {
-      return unit(sub(this.placement.target, this.placement.eye));
-    }
-    right() {
-      const right = unit(cross(this.placement.up, this.forward()));
-      return this.mirrored ? scale(right, -1) : right;
-    }
-    upward() {
-      const forward = this.forward();
-      return unit(sub(this.placement.up, scale(forward, dot(this.placement.up, forward))));
-    }
-    distance() {
-      return length(sub(this.placement.target, this.placement.eye));
-    }
-    /** An axis that the picture does not lean to the side of; pbrt files do not say which is up. */
-    upright(scene, unsaid) {
-      const [right, up] = [this.right(), this.upward()];
-      const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-      const candidates = [...axes, ...axes.map((axis) => scale(axis, -1)), scene.up];
-      let [best, most] = [up, 0];
-      for (const axis of candidates) {
-        const bonus = axis === scene.up && !unsaid ? 0.5 : 0;
-        const standing = dot(axis, up) + bonus;
-        if (Math.abs(dot(axis, right)) < 1e-3 && dot(axis, up) > 1e-3 && standing > most) [best, most] = [axis, standing];
-      }
-      return best;
-    }
-    /** Turns around the target by angles in radians: to the right, and up. */
-    orbit(right, up) {
-      let { eye, target } = this.placement;
-      let offset = sub(eye, target);
-      const sideways = Math.sign(dot(cross(this.axis, offset), this.right())) || 1;
-      offset = turned(offset, this.axis, right * sideways);
-      const polar = Math.acos(Math.max(-1, Math.min(1, dot(unit(offset), this.axis))));
-      const wanted = Math.max(POLE, Math.min(Math.PI - POLE, this.lowest(), polar - up));
-      const across = cross(this.axis, offset);
-      if (length(across) > 0) offset = turned(offset, unit(across), wanted - polar);
-      eye = add(target, offset);
-      this.placement = { eye, target, up: this.axis };
-      this.rise(false);
-    }
-    /** The largest angle from straight above at which the camera is above the ground, as far from its target as it is. */
-    lowest() {
-      const { ground } = this;
-      if (this.mayGoBelow || !ground || dot(unit(ground.normal), this.axis) < 0.999) return Math.PI;
-      const reach = this.distance();
-      const drop = (LEAST_HEIGHT * reach - this.height(this.placement.target)) / reach;
-      return Math.acos(Math.max(-1, Math.min(1, drop)));
-    }
-    /** Moves eye and target: to the right, up and forward, in shares of the distance between them. */
-    move(right, up, forward) {
-      const by = this.distance();
-      const step = add(add(scale(this.right(), right * by), scale(this.upward(), up * by)), scale(this.forward(), forward * by));
-      const { eye, target } = this.placement;
-      this.placement = { eye: add(eye, step), target: add(target, step), up: this.axis };
-      this.rise(true);
-    }
-    /** Comes nearer to the target by a factor, or shows more of it. */
-    dolly(factor) {
-      const { eye, target } = this.placement;
-      this.placement = { eye: add(target, scale(sub(eye, target), factor)), target, up: this.axis };
-      this.rise(false);
-      this.zoom = Math.max(1e-4, Math.min(1e4, this.zoom / factor));
-    }
-    /** Turns around this point from now on. */
-    lookAt(point2) {
-      const { eye } = this.placement;
-      this.placement = { eye, target: point2, up: this.axis };
-    }
-    /** As pbrt writes it. */
-    toPbrt() {
-      const { eye, target } = this.placement;
-      const numbers2 = (v) => v.map((x) => +x.toPrecision(9)).join(" ");
-      const mirror = this.mirrored ? "Scale -1 1 1\n" : "";
-      const lens = this.fov === null ? "" : `
-Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
-      return `${mirror}LookAt ${numbers2(eye)}  ${numbers2(target)}  ${numbers2(this.upward())}${lens}`;
-    }
-    /** As glTF writes it: a node, whose camera looks along -z. */
-    toGltf(aspect) {
-      const columns = [
-        [this.right(), 0],
-        [this.upward(), 0],
-        [scale(this.forward(), -1), 0],
-        [this.placement.eye, 1]
-      ];
-      const matrix = columns.flatMap(([v, w]) => [...v.map((x) => +x.toPrecision(9)), w]);
-      const shorter = (this.fov ?? 45) * Math.PI / 180;
-      const yfov = aspect >= 1 ? shorter : 2 * Math.atan(Math.tan(shorter / 2) / aspect);
-      const perspective = { aspectRatio: +aspect.toPrecision(9), yfov: +yfov.toPrecision(9), znear: 0.01 };
-      return JSON.stringify({ cameras: [{ type: "perspective", perspective }], nodes: [{ camera: 0, matrix }] });
-    }
-  };
-
-  // src/sheet.ts
-  var MOST_ZOOM = 256;
-  var NUMBERS_FROM = 32;
-  function context(canvas) {
-    const found = canvas.getContext("2d", { willReadFrequently: false });
-    if (!found) throw new Error("this browser has no canvas");
-    return found;
+    all.append(list);
+    panel.append(all);
   }
-  var Sheet = class {
-    constructor(stage, sheet2, picture, reference, numbers2, marks) {
-      this.stage = stage;
-      this.sheet = sheet2;
-      this.picture = picture;
-      this.reference = reference;
-      this.numbers = numbers2;
-      this.marks = marks;
-      new ResizeObserver(() => this.place()).observe(stage);
-    }
-    stage;
-    sheet;
-    picture;
-    reference;
-    numbers;
-    marks;
-    width = 16;
-    height = 9;
-    /** Screen pixels a pixel; 0 fits the picture. */
-    zoom = 0;
-    left = 0;
-    top = 0;
-    /** Where the reference begins, in percent of the width. */
-    part = 50;
-    small = document.createElement("canvas");
-    changed = () => {
-    };
-    show(frame) {
-      const { fullWidth, fullHeight } = frame;
-      if (frame.isFull && (this.width !== frame.width || this.height !== frame.height)) this.size(frame.width, frame.height);
-      if (!frame.isFull && Math.abs(this.width / this.height - frame.width / frame.height) > 0.05) this.size(fullWidth, fullHeight);
-      const drawing = context(this.picture);
-      if (frame.width === this.width && frame.height === this.height) {
-        drawing.putImageData(frame.pixels, 0, 0);
-      } else {
-        if (this.small.width !== frame.width || this.small.height !== frame.height) {
-          [this.small.width, this.small.height] = [frame.width, frame.height];
-        }
-        context(this.small).putImageData(frame.pixels, 0, 0);
-        drawing.imageSmoothingQuality = "low";
-        drawing.clearRect(0, 0, this.width, this.height);
-        drawing.drawImage(this.small, 0, 0, this.width, this.height);
-      }
-    }
-    size(width, height) {
-      [this.width, this.height] = [width, height];
-      [this.picture.width, this.picture.height] = [width, height];
-      this.place();
-    }
-    fit() {
-      return Math.min(this.stage.clientWidth / this.width, this.stage.clientHeight / this.height);
-    }
-    /** Screen pixels a pixel. */
-    scale() {
-      return this.zoom || this.fit();
-    }
-    place() {
-      const scale2 = this.scale();
-      const [width, height] = [this.width * scale2, this.height * scale2];
-      const within = (at, size, room) => size <= room ? (room - size) / 2 : Math.min(0, Math.max(room - size, at));
-      this.left = within(this.left, width, this.stage.clientWidth);
-      this.top = within(this.top, height, this.stage.clientHeight);
-      const style = this.sheet.style;
-      [style.left, style.top, style.width, style.height] = [`${this.left}px`, `${this.top}px`, `${width}px`, `${height}px`];
-      this.sheet.classList.toggle("pixels", scale2 > 2);
-      this.clearNumbers();
-      this.changed();
-    }
-    /** Zooms about a place of the screen. */
-    zoomBy(factor, x = this.stage.clientWidth / 2, y = this.stage.clientHeight / 2) {
-      const before = this.scale();
-      const after = Math.min(MOST_ZOOM, before * factor);
-      this.zoom = after <= this.fit() ? 0 : after;
-      const ratio = this.scale() / before;
-      this.left = x - (x - this.left) * ratio;
-      this.top = y - (y - this.top) * ratio;
-      this.place();
-    }
-    zoomOut() {
-      this.zoom = 0;
-      this.place();
-    }
-    slide(x, y) {
-      this.left += x;
-      this.top += y;
-      this.place();
-    }
-    isZoomed() {
-      return this.zoom > 0;
-    }
-    /** The place in the picture, in pixels, of one on the screen; null outside. */
-    at(clientX, clientY) {
-      const box = this.stage.getBoundingClientRect();
-      const [x, y] = [(clientX - box.left - this.left) / this.scale(), (clientY - box.top - this.top) / this.scale()];
-      return x >= 0 && y >= 0 && x < this.width && y < this.height ? [x, y] : null;
-    }
-    /** The pixels whose numbers can be read: x, y, width, height. */
-    readable() {
-      const scale2 = this.scale();
-      if (scale2 < NUMBERS_FROM) return null;
-      const x = Math.max(0, Math.floor(-this.left / scale2));
-      const y = Math.max(0, Math.floor(-this.top / scale2));
-      const width = Math.min(64, this.width - x, Math.ceil(this.stage.clientWidth / scale2) + 1);
-      const height = Math.min(64, this.height - y, Math.ceil(this.stage.clientHeight / scale2) + 1);
-      return [x, y, width, height];
-    }
-    clearNumbers() {
-      if (this.numbers.width > 1) [this.numbers.width, this.numbers.height] = [1, 1];
-    }
-    writeNumbers(x0, y0, width, values) {
-      const scale2 = this.scale();
-      if (scale2 < NUMBERS_FROM) return;
-      const canvas = this.numbers;
-      const rows = Math.ceil(values.length / Math.max(1, width));
-      [canvas.width, canvas.height] = [Math.round(width * scale2), Math.round(rows * scale2)];
-      const style = canvas.style;
-      [style.left, style.top] = [`${x0 * scale2}px`, `${y0 * scale2}px`];
-      [style.width, style.height] = [`${canvas.width}px`, `${canvas.height}px`];
-      const drawing = context(canvas);
-      drawing.font = `${Math.max(8, Math.min(13, scale2 / 5))}px ui-monospace, monospace`;
-      drawing.textAlign = "center";
-      drawing.textBaseline = "middle";
-      const colours = ["#ff9a9a", "#9dffa6", "#a9c8ff"];
-      values.forEach((value, i) => {
-        const [x, y] = [(i % width + 0.5) * scale2, (Math.floor(i / width) + 0.5) * scale2];
-        value.forEach((number, channel) => {
-          const text = typeof number === "number" ? +number.toPrecision(3) + "" : number;
-          const at = y + (channel - 1) * scale2 * 0.25;
-          drawing.lineWidth = 3;
-          drawing.strokeStyle = "#000";
-          drawing.strokeText(text, x, at, scale2 - 2);
-          drawing.fillStyle = colours[channel] ?? "#fff";
-          drawing.fillText(text, x, at, scale2 - 2);
-        });
-      });
-    }
-    /** Marks places of the picture, and the line between two of them; none takes the marks away. */
-    mark(places) {
-      const svg = (name, attributes) => {
-        const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-        for (const [key2, value] of Object.entries(attributes)) made.setAttribute(key2, String(value));
-        return made;
-      };
-      this.marks.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
-      const radius = 5 / this.scale();
-      const dots = places.map(([cx, cy]) => svg("circle", { cx, cy, r: radius }));
-      const [a, b] = places;
-      const line = a && b ? [svg("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] })] : [];
-      this.marks.replaceChildren(...line, ...dots);
-    }
-    /** What is shown, the reference too where it covers the picture, as a PNG. */
-    async snapshot() {
-      const canvas = document.createElement("canvas");
-      [canvas.width, canvas.height] = [this.width, this.height];
-      const drawing = context(canvas);
-      drawing.drawImage(this.picture, 0, 0);
-      if (!this.reference.hidden) {
-        const from = Math.round(this.width * this.part / 100);
-        const wide = this.width - from;
-        if (wide > 0) drawing.drawImage(this.reference, from, 0, wide, this.height, from, 0, wide, this.height);
-      }
-      return new Promise((found) => canvas.toBlob(found, "image/png"));
-    }
-    /** Keeps a picture to compare with; without one, what is shown. */
-    keep(source = this.picture) {
-      [this.reference.width, this.reference.height] = [this.width, this.height];
-      context(this.reference).drawImage(source, 0, 0, this.width, this.height);
-      this.reference.hidden = false;
-    }
-    split(percent) {
-      this.part = percent;
-      this.reference.style.clipPath = `inset(0 0 0 ${percent}%)`;
-    }
-  };
-
-  // src/page.ts
-  var MOST_TIMES = 2e3;
-  var measured = {
-    latencies: [],
-    frames: [],
-    changes: /* @__PURE__ */ new Map(),
-    spp: 0,
-    done: false,
-    sequence: 0,
-    /** When the first frame came, and the first without noise, by the clock of the page. */
-    first: 0,
-    firstDenoised: 0,
-    /** Frames with noise, since this was last set to 0. */
-    noisy: 0
-  };
-  Object.assign(globalThis, { lumbreMeasured: measured });
-  var Page = class {
-    sheet = new Sheet(
-      byId("stage"),
-      byId("sheet"),
-      byId("picture"),
-      byId("reference"),
-      byId("numbers"),
-      document.querySelector("#marks")
-    );
-    camera = new Camera();
-    scene;
-    state;
-    connection;
-    connected = false;
-    /** Whether it only looks on. */
-    watches = false;
-    /** Called when the camera was moved by hand. */
-    onCamera = () => {
-    };
-    requests = 0;
-    isMoving = false;
-    // What the camera is at is counted, so that one knows which frame shows it. Others count from elsewhere.
-    sequence = Math.floor(Math.random() * 2147418112);
-    mine = -1;
-    send(message) {
-      this.connection?.send(message);
-    }
-    /** Sends a question, and returns the number by which its answer is known. */
-    ask(message) {
-      this.requests += 1;
-      this.send({ ...message, request: this.requests });
-      return this.requests;
-    }
-    set(options2) {
-      this.send({ type: "set", ...options2 });
-    }
-    /** The camera was moved: it is sent once a frame of the screen. */
-    moved() {
-      if (this.watches) {
-        if (this.state && this.scene) this.camera.take(this.state, this.scene);
-        return;
-      }
-      this.onCamera();
-      if (this.isMoving) return;
-      this.isMoving = true;
-      requestAnimationFrame(() => {
-        this.isMoving = false;
-        this.sequence = this.sequence + 1 >>> 0;
-        this.mine = this.sequence;
-        measured.changes.set(this.sequence, performance.now());
-        const { placement, fov, zoom } = this.camera;
-        this.send({ type: "camera", sequence: this.sequence, placement, fov, zoom });
-      });
-    }
-    /** One of the file's cameras, as it is. */
-    reset(index) {
-      this.sequence = this.sequence + 1 >>> 0;
-      this.mine = -1;
-      this.onCamera();
-      this.send({ type: "reset", sequence: this.sequence, camera: index });
-    }
-    /** Takes the camera of the state, unless it was moved here: what comes back is older than what the hand does. */
-    takeCamera(state, scene) {
-      const isOwn = state.moved && state.sequence === this.mine;
-      if (!isOwn && !this.isMoving) this.camera.take(state, scene);
-    }
-    show(frame) {
-      this.sheet.show(frame);
-      const now = performance.now();
-      measured.frames.push(now);
-      if (measured.frames.length > MOST_TIMES) measured.frames.splice(0, MOST_TIMES / 2);
-      measured.first ||= now;
-      if (frame.isDenoised) measured.firstDenoised ||= now;
-      else measured.noisy += 1;
-      [measured.spp, measured.done, measured.sequence] = [frame.isFull ? frame.spp : 0, frame.isDone, frame.sequence];
-      for (const [change, since] of measured.changes) {
-        if (change > frame.sequence) continue;
-        if (change === frame.sequence) measured.latencies.push(now - since);
-        measured.changes.delete(change);
-      }
-    }
-  };
 
   // src/progress.ts
   var DOING = {
@@ -1428,76 +1746,95 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     waiting: "Waiting for the file to be mended",
     nothing: "No scene"
   };
-  function reached({ spp = 0, target = 0, noise, noise_target }) {
-    if (target === 0) return ["done"];
+  function reached({ spp, target, noise, noise_target }) {
+    if (!target) return ["done"];
     if (noise_target) {
-      const now = noise == null ? [] : [`noise ${noise.toFixed(4)} of ${noise_target}`];
-      return [`${spp} samples`, ...now];
+      const now = noise === null ? [] : [`noise ${noise.toFixed(4)} of ${noise_target}`];
+      return [`${spp ?? 0} samples`, ...now];
     }
-    return [`${spp} of ${target} samples`, ...noise != null && spp > 1 ? [`noise ${noise.toFixed(4)}`] : []];
+    return [`${spp ?? 0} of ${target} samples`, ...noise !== null && (spp ?? 0) > 1 ? [`noise ${noise.toFixed(4)}`] : []];
   }
   function showProgress(progress) {
-    const { doing, target = 0, share = doing === "done" ? 1 : 0 } = progress;
+    const { doing } = progress;
+    const share = progress.share ?? (doing === "done" ? 1 : 0);
     let text = DOING[doing];
     if (doing === "rendering" || doing === "done") {
       const parts = reached(progress);
       if (doing === "rendering" && share > 0) parts.push(`${Math.floor(100 * share)} %`);
-      if (doing === "rendering" && progress.left != null) parts.push(`${spoken(progress.left)} left`);
+      if (doing === "rendering" && progress.left !== null) parts.push(`${spoken(progress.left)} left`);
       if (doing === "done" && progress.seconds) parts.push(`done in ${spoken(progress.seconds)}`);
       if (progress.rays_per_second) parts.push(`${large(progress.rays_per_second)} rays/s`);
       if (progress.dropped) parts.push(`${progress.dropped} samples dropped`);
       text = parts.join(" \xB7 ");
     }
     byId("progress").textContent = text;
-    byId("bar").value = target > 0 || doing === "done" ? share : 0;
+    byId("bar").value = progress.target || doing === "done" ? share : 0;
   }
 
-  // src/section.ts
-  var AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
-  var Section = class {
-    constructor(page2) {
-      this.page = page2;
-      this.axis.addEventListener("change", () => this.send());
-      this.place.addEventListener("input", () => this.send());
-      this.draw();
-    }
-    page;
-    axis = byId("section-axis");
-    place = byId("section-place");
-    shown = null;
-    take({ section: section2 }) {
-      this.shown = section2;
-      if (!section2 && document.activeElement !== this.axis) this.axis.value = "none";
-      this.draw();
-    }
-    /** The camera was moved: what is on its side of the plane is cut away. */
-    moved() {
-      const plane = this.plane();
-      if (plane && this.shown && this.axis.value !== "view" && dot(plane.normal, this.shown.normal) < 0) this.send();
-    }
-    plane() {
-      const { camera: camera2, scene } = this.page;
-      const share = Number(this.place.value) / 100;
-      if (this.axis.value === "view") {
-        const point3 = add(camera2.placement.eye, scale(camera2.forward(), 2 * share * camera2.distance()));
-        return { point: point3, normal: scale(camera2.forward(), -1) };
-      }
-      const axis = AXES[this.axis.value];
-      if (!axis || !scene?.bounds) return null;
-      const [low, high] = scene.bounds;
-      const point2 = add(low, scale(sub(high, low), share));
-      const side = dot(sub(camera2.placement.eye, point2), axis) < 0 ? -1 : 1;
-      return { point: point2, normal: scale(axis, side) };
-    }
-    send() {
-      this.shown = this.plane();
-      this.page.send({ type: "section", plane: this.shown });
-      this.draw();
-    }
-    draw() {
-      this.place.disabled = this.axis.value === "none";
-    }
-  };
+  // src/state.ts
+  function fill(id, text) {
+    const input = byId(id);
+    if (document.activeElement !== input) input.value = text;
+  }
+  function showState(app2, state) {
+    const { page: page2 } = app2;
+    showName(app2, state);
+    const error = byId("edit-error");
+    error.textContent = state.edit_error ?? "";
+    error.hidden = !state.edit_error;
+    showPicture(state);
+    app2.editor.take(state.settings);
+    app2.lights.take(state.settings);
+    app2.tree.take(state.hidden);
+    app2.display.take(state);
+    app2.section.take(state);
+    app2.views.open(state.name);
+    byId("save-overlay").disabled = state.settings.length === 0;
+    byId("drop-edits").disabled = state.settings.length === 0;
+    if (!page2.scene) return;
+    showCamera(app2, state, page2.scene);
+    showMoment(state, page2.scene);
+  }
+  function showName({ page: page2, alert }, state) {
+    document.title = state.name ? `${state.name} \u2013 Lumbre` : "Lumbre";
+    byId("name").textContent = state.name || "Lumbre";
+    const title = state.has_scene ? "The file has an error; this is the last good picture." : "The file has an error.";
+    if (page2.connected) alert(state.error ? title : "", state.error ?? "");
+    byId("empty").hidden = state.name !== "";
+    byId("sheet").hidden = state.name === "";
+  }
+  function showPicture(state) {
+    byId("pause").setAttribute("aria-pressed", String(state.paused));
+    byId("channel").value = state.channel;
+    byId("tone-map").value = state.tone_map ?? "none";
+    byId("scale").value = String(state.scale);
+    const exposure = state.exposure ?? 0;
+    fill("exposure", String(exposure));
+    byId("exposure-value").textContent = exposure.toFixed(1);
+    fill("spp", String(state.spp ?? 64));
+    fill("noise-target", state.noise ? String(state.noise) : "");
+    byId("false-colour").checked = state.false_colour;
+    byId("denoise").checked = state.denoise ?? false;
+  }
+  function showCamera({ page: page2, camera: camera2 }, state, scene) {
+    options(byId("camera"), scene.cameras.map(({ name }, i) => [String(i), name]), String(state.camera));
+    page2.takeCamera(state, scene);
+    byId("ground-details").hidden = scene.ground === null;
+    byId("below-ground").checked = camera2.mayGoBelow;
+    byId("fov").disabled = camera2.fov === null;
+    fill("fov", camera2.fov === null ? "" : short(camera2.fov));
+  }
+  function showMoment(state, scene) {
+    const end = Math.max(0, ...scene.animations.map((animation) => animation.end ?? 0));
+    for (const part of document.querySelectorAll(".animated")) part.hidden = end === 0;
+    byId("animation-time").max = String(end);
+    const time = state.time ?? 0;
+    fill("animation-time", String(time));
+    byId("time-value").textContent = `${time.toFixed(2)} s`;
+    for (const part of document.querySelectorAll(".varied")) part.hidden = scene.variants.length === 0;
+    const variants = [["", "as in the file"], ...scene.variants.map((name) => [name, name])];
+    options(byId("variant"), variants, state.variant ?? "");
+  }
 
   // src/static-connection.ts
   function bytes(base64) {
@@ -1514,8 +1851,8 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     return exponent === 0 ? sign * fraction * 2 ** -24 : sign * (1 + fraction / 1024) * 2 ** (exponent - 15);
   }
   var StaticConnection = class {
-    constructor(listener2, data2) {
-      this.listener = listener2;
+    constructor(listener, data2) {
+      this.listener = listener;
       this.data = data2;
       setTimeout(() => void this.start());
     }
@@ -1527,7 +1864,8 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     async start() {
       this.listener.onOpen("edit");
       this.listener.onMessage({ type: "scene", scene: this.data.scene });
-      this.listener.onMessage({ type: "progress", doing: "done", ...this.data.progress });
+      const unknown = { share: null, noise_target: null, left: null, dropped: null };
+      this.listener.onMessage({ type: "progress", doing: "done", ...unknown, ...this.data.progress });
       await this.show("beauty");
       this.picks = await unpacked(this.data.picks.values);
     }
@@ -1546,7 +1884,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
         size: null,
         channel,
         scale: 1,
-        spp: this.data.progress.spp ?? null,
+        spp: this.data.progress.spp,
         noise: null,
         denoise: null,
         paused: false,
@@ -1575,37 +1913,38 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       const pixels = drawing.getImageData(0, 0, width, height);
       [this.shown, this.values] = [pixels, void 0];
       if (channel.values) this.values = await unpacked(channel.values);
-      const spp = this.data.progress.spp ?? 0;
+      const spp = this.data.progress.spp;
       this.listener.onFrame({ width, height, fullWidth: width, fullHeight: height, spp, sequence: 0, isFull: true, isDone: true, isDenoised: false, low: 0, high: 0, pixels });
     }
     pick(x, y, request) {
       if (!this.picks || !this.shown) return;
       const at = 8 * (y * this.shown.width + x);
-      const thing = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
-      const hits = thing ? [{ ...thing, distance: this.picks.getFloat32(at + 4, true) }] : [];
-      this.listener.onMessage({ type: "picked", request, x, y, ray: { hits } });
+      const shape = this.data.picks.shapes[this.picks.getUint32(at, true) - 1];
+      const hits = shape ? [{ ...shape, distance: this.picks.getFloat32(at + 4, true), surface: null }] : [];
+      this.listener.onMessage({ type: "picked", request, x, y, ray: { origin: null, direction: null, hits } });
     }
-    /** There is nobody to give one. */
+    /** No viewer gives an address. */
     ticket() {
       return Promise.reject(new Error("at rest"));
     }
     send(message) {
-      const { type, channel, x, y, width, height, request } = message;
-      if (type === "set" && channel) void this.show(String(channel));
-      if (type === "pick") this.pick(Math.floor(x ?? 0), Math.floor(y ?? 0), request ?? 0);
-      if (type !== "values" || !this.shown) return;
+      if (message.type === "set" && message.channel) void this.show(message.channel);
+      if (message.type === "pick") this.pick(Math.floor(message.x), Math.floor(message.y), message.request);
+      if (message.type === "values") this.read(message);
+    }
+    read({ x, y, width, height, request }) {
+      if (!this.shown) return;
       const whole = this.shown.width;
-      const [x0, y0] = [x ?? 0, y ?? 0];
-      const [columns, rows] = [Math.min(width ?? 0, whole - x0), Math.min(height ?? 0, this.shown.height - y0)];
-      const found = [];
-      for (let row = y0; row < y0 + rows; row++) {
-        for (let column = x0; column < x0 + columns; column++) {
+      const [columns, rows] = [Math.min(width, whole - x), Math.min(height, this.shown.height - y)];
+      const values = [];
+      for (let row = y; row < y + rows; row++) {
+        for (let column = x; column < x + columns; column++) {
           const pixel = row * whole + column;
           const value = (c) => this.values ? half(this.values.getUint16(2 * (3 * pixel + c), true)) : +((this.shown?.data[4 * pixel + c] ?? 0) / 255).toFixed(3);
-          found.push([value(0), value(1), value(2)]);
+          values.push([value(0), value(1), value(2)]);
         }
       }
-      this.listener.onMessage({ type: "values", request: request ?? 0, x: x0, y: y0, width: columns, height: rows, values: found });
+      this.listener.onMessage({ type: "values", request, x, y, width: columns, height: rows, values });
     }
   };
   var CHANGES = [
@@ -1639,357 +1978,141 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     for (const option of document.querySelectorAll("option[value=ids], option[value=variance]")) option.remove();
   }
 
-  // src/views.ts
-  var OPPOSITE = { front: "back", back: "front", right: "left", left: "right", top: "bottom", bottom: "top" };
-  var TILT = 2e-3;
-  function sides(up) {
-    const y = [0, 1, 0];
-    const z = [0, 0, 1];
-    const n = unit(up);
-    const c = dot(y, n);
-    const axis = cross(y, n);
-    const front = c < -1 + 1e-9 ? [0, 0, -1] : add(add(scale(z, c), cross(axis, z)), scale(axis, dot(axis, z) / (1 + c)));
-    return { front: unit(front), right: unit(cross(n, front)) };
-  }
-  var Views = class {
-    constructor(page2, camera2) {
-      this.page = page2;
-      this.camera = camera2;
-      for (const button of document.querySelectorAll("button[data-view]")) {
-        button.addEventListener("click", () => this.show(button.dataset["view"]));
+  // src/inbox.ts
+  var Inbox = class {
+    constructor(app2) {
+      this.app = app2;
+    }
+    app;
+    onFrame(frame) {
+      const { page: page2, display, pixels } = this.app;
+      page2.show(display.shown(frame));
+      display.draw();
+      if (frame.isFull) pixels.refresh();
+    }
+    onMessage(message) {
+      const { page: page2, pixels } = this.app;
+      switch (message.type) {
+        case "scene":
+          this.onScene(message.scene);
+          break;
+        case "state":
+          page2.state = message;
+          showState(this.app, message);
+          break;
+        case "progress":
+          showProgress(message);
+          break;
+        case "picked":
+          this.onPicked(message);
+          break;
+        case "values":
+          pixels.show(message);
+          break;
+        case "ticket":
+          break;
+        case "wrong":
+          byId("edit-error").textContent = message.what;
+          byId("edit-error").hidden = false;
+          break;
       }
-      byId("keep-view").addEventListener("click", () => this.keep());
     }
-    page;
-    camera;
-    kept = [];
-    sceneName = "";
-    /** The views that were kept of a scene. */
-    open(name) {
-      if (name === this.sceneName) return;
-      this.sceneName = name;
-      this.kept = JSON.parse(sessionStorage.getItem(this.key) ?? "[]");
-      this.draw();
+    onScene(scene) {
+      const { page: page2, editor, lights, tree, explanation } = this.app;
+      page2.scene = scene;
+      showFacts(byId("facts"), byId("warnings"), scene);
+      editor.list(scene.parameters);
+      lights.list(scene.parameters);
+      tree.list(scene);
+      explanation.offer(scene.languages);
+      if (page2.state) showState(this.app, page2.state);
     }
-    /** All of the scene from one of its sides. */
-    show(side) {
-      const { scene } = this.page;
-      if (!scene?.bounds) return;
-      const [low, high] = scene.bounds;
-      const up = unit(this.camera.upwards);
-      const { front, right } = sides(up);
-      const above = unit(add(up, scale(front, TILT)));
-      const below = unit(add(scale(up, -1), scale(front, TILT)));
-      const from = { front, back: scale(front, -1), right, left: scale(right, -1), top: above, bottom: below };
-      const target = scale(add(low, high), 0.5);
-      const radius = 0.5 * length(sub(high, low)) || 1;
-      const half2 = (this.camera.fov ?? 45) * Math.PI / 360;
-      const eye = add(target, scale(from[side], 1.05 * radius / Math.sin(half2)));
-      if (side === "bottom") this.camera.mayGoBelow = true;
-      this.camera.place({ eye, target, up });
-      this.page.moved();
+    onPicked({ request, x, y, ray }) {
+      const { app: app2 } = this;
+      const first = ray.hits[0];
+      showHits(byId("picked"), ray.hits);
+      app2.select(first);
+      app2.measure.take(x, y, first);
+      app2.explanation.of(Math.floor(x), Math.floor(y));
+      if (request === app2.orbitOnPick && first?.surface) {
+        app2.camera.lookAt(first.surface.point);
+        app2.page.moved();
+      }
     }
-    /** From the other side. */
-    turn() {
-      const { eye, target, up } = this.camera.placement;
-      this.camera.place({ eye: sub(scale(target, 2), eye), target, up });
-      this.page.moved();
+    onOpen(access) {
+      const { page: page2 } = this.app;
+      page2.connected = true;
+      page2.watches = access === "watch";
+      byId("watching").hidden = !page2.watches;
+      if (page2.watches) hideWhatNeedsAViewer(true);
+      this.app.alert("", "");
     }
-    static opposite(side) {
-      return OPPOSITE[side];
-    }
-    get key() {
-      return `lumbre-views:${this.sceneName}`;
-    }
-    keep() {
-      const input = byId("view-name");
-      const { placement, fov, zoom } = this.camera;
-      this.kept.push({ name: input.value.trim() || `View ${this.kept.length + 1}`, placement, fov, zoom });
-      input.value = "";
-      this.store();
-    }
-    store() {
-      sessionStorage.setItem(this.key, JSON.stringify(this.kept));
-      this.draw();
-    }
-    draw() {
-      const rows = this.kept.map((view, i) => {
-        const row = element("li");
-        const show = element("button", view.name, { className: "select" });
-        show.addEventListener("click", () => {
-          [this.camera.fov, this.camera.zoom] = [view.fov, view.zoom];
-          this.camera.place(view.placement);
-          this.page.moved();
-        });
-        const drop = element("button", "Remove");
-        drop.setAttribute("aria-label", `Remove ${view.name}`);
-        drop.addEventListener("click", () => {
-          this.kept.splice(i, 1);
-          this.store();
-        });
-        row.append(show, drop);
-        return row;
-      });
-      byId("kept-views").replaceChildren(...rows);
+    onStatus(how) {
+      const { app: app2 } = this;
+      app2.page.connected = false;
+      if (how === "gone") app2.alert("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
+      if (how === "refused") app2.alert("The viewer does not know this page.", "Open the address that lumbre view printed. It works once, in one tab: to have another one, start the viewer again.");
+      if (how === "foreign") app2.alert("Another program answers in place of the viewer.", "It cannot prove to be the viewer, and was told nothing.");
+      byId("progress").textContent = "Not connected";
     }
   };
 
-  // src/main.ts
-  var page = new Page();
-  var { sheet, camera } = page;
-  var listener = { onMessage, onFrame, onOpen, onStatus };
-  var data = globalThis.lumbreAtRest;
-  page.connection = data ? new StaticConnection(listener, data) : new Connection(listener);
-  var turnAround = 0;
-  var picked;
-  var hovered = null;
-  var asked = 0;
-  function onFrame(frame) {
-    page.show(display.shown(frame));
-    display.draw();
-    if (frame.isFull) askNumbers();
-    if (hovered && frame.isFull) askPixel();
-  }
-  function onMessage(message) {
-    switch (message.type) {
-      case "scene":
-        page.scene = message.scene;
-        showFacts(byId("facts"), byId("warnings"), message.scene);
-        editor.list(message.scene.parameters);
-        lights.list(message.scene.parameters);
-        tree.list(message.scene);
-        explanation.offer(message.scene.languages);
-        if (page.state) showState(page.state);
-        break;
-      case "state":
-        page.state = message;
-        showState(message);
-        break;
-      case "progress":
-        showProgress(message);
-        break;
-      case "picked":
-        showHits(byId("picked"), message.ray.hits);
-        select(message.ray.hits[0]);
-        measure.take(message.x, message.y, message.ray.hits[0]);
-        explanation.of(Math.floor(message.x), Math.floor(message.y));
-        if (message.request === turnAround && message.ray.hits[0]?.point) {
-          camera.lookAt(message.ray.hits[0].point);
-          page.moved();
-        }
-        break;
-      case "values":
-        if (message.width === 1 && message.height === 1) {
-          const [value] = message.values;
-          if (value) byId("pixel").textContent = `${message.x}, ${message.y}: ${value.map((v) => typeof v === "number" ? short(v) : v).join("  ")}`;
-        } else {
-          sheet.writeNumbers(message.x, message.y, message.width, message.values);
-        }
-        break;
-      case "wrong":
-        byId("edit-error").textContent = message.what;
-        byId("edit-error").hidden = false;
-        break;
-    }
-  }
-  function select(thing) {
-    picked = thing;
-    tree.select(thing?.shape ?? -1);
-    editor.mark(thing?.owner ?? null);
-    const isShape = thing !== void 0 && thing.kind !== "ground";
-    byId("picked-buttons").hidden = !isShape || data !== void 0 || page.watches;
-    byId("edit-picked").hidden = !thing?.owner;
-    byId("light-picked").hidden = !thing?.shines;
-  }
-  function alertOf(title, text) {
-    byId("alert-title").textContent = title;
-    byId("alert-text").textContent = text;
-    byId("alert").hidden = title === "";
-  }
-  function onOpen(access) {
-    page.connected = true;
-    page.watches = access === "watch";
-    byId("watching").hidden = !page.watches;
-    if (page.watches) hideWhatNeedsAViewer(true);
-    alertOf("", "");
-  }
-  function onStatus(how) {
-    page.connected = false;
-    if (how === "gone") alertOf("The viewer does not answer.", "It has ended, or the tunnel to it has. This page goes on when it is back.");
-    if (how === "refused") alertOf("The viewer does not know this page.", "Open the address that lumbre view printed. It works once, in one tab: to have another one, start the viewer again.");
-    if (how === "foreign") alertOf("Another program answers in place of the viewer.", "It cannot prove to be the viewer, and was told nothing.");
-    byId("progress").textContent = "Not connected";
-  }
-  function showState(now) {
-    document.title = now.name ? `${now.name} \u2013 Lumbre` : "Lumbre";
-    byId("name").textContent = now.name || "Lumbre";
-    if (page.connected) alertOf(now.error ? now.has_scene ? "The file has an error; this is the last good picture." : "The file has an error." : "", now.error ?? "");
-    byId("empty").hidden = now.name !== "";
-    byId("sheet").hidden = now.name === "";
-    const error = byId("edit-error");
-    error.textContent = now.edit_error ?? "";
-    error.hidden = !now.edit_error;
-    const pause = byId("pause");
-    pause.setAttribute("aria-pressed", String(now.paused));
-    byId("channel").value = now.channel;
-    byId("tone-map").value = now.tone_map ?? "none";
-    byId("scale").value = String(now.scale);
-    const active = document.activeElement;
-    const value = (id, text) => {
-      const input = byId(id);
-      if (active !== input) input.value = text;
-    };
-    value("exposure", String(now.exposure ?? 0));
-    byId("exposure-value").textContent = (now.exposure ?? 0).toFixed(1);
-    value("spp", String(now.spp ?? 64));
-    value("noise-target", now.noise ? String(now.noise) : "");
-    byId("false-colour").checked = now.false_colour;
-    byId("denoise").checked = now.denoise ?? false;
-    editor.take(now.settings);
-    lights.take(now.settings);
-    tree.take(now.hidden);
-    display.take(now);
-    section.take(now);
-    views.open(now.name);
-    byId("save-overlay").disabled = now.settings.length === 0;
-    byId("drop-edits").disabled = now.settings.length === 0;
-    const { scene } = page;
-    if (!scene) return;
-    options(byId("camera"), scene.cameras.map(({ name }, i) => [String(i), name]), String(now.camera));
-    page.takeCamera(now, scene);
-    byId("ground-details").hidden = scene.ground === null;
-    byId("below-ground").checked = camera.mayGoBelow;
-    const fov = byId("fov");
-    fov.disabled = camera.fov === null;
-    value("fov", camera.fov === null ? "" : short(camera.fov));
-    const end = Math.max(0, ...scene.animations.map((animation) => animation.end ?? 0));
-    for (const part of document.querySelectorAll(".animated")) part.hidden = end === 0;
-    byId("animation-time").max = String(end);
-    value("animation-time", String(now.time ?? 0));
-    byId("time-value").textContent = `${(now.time ?? 0).toFixed(2)} s`;
-    for (const part of document.querySelectorAll(".varied")) part.hidden = scene.variants.length === 0;
-    const variants = [["", "as in the file"], ...scene.variants.map((name) => [name, name])];
-    options(byId("variant"), variants, now.variant ?? "");
-  }
-  function askPixel() {
-    const now = performance.now();
-    if (!hovered || now - asked < 40) return;
-    asked = now;
-    const [x, y] = hovered;
-    page.ask({ type: "values", x: Math.floor(x), y: Math.floor(y), width: 1, height: 1 });
-  }
-  var numbersWait = 0;
-  function askNumbers() {
-    const rectangle = sheet.readable();
-    if (!rectangle) return;
-    clearTimeout(numbersWait);
-    const [x, y, width, height] = rectangle;
-    numbersWait = setTimeout(() => page.ask({ type: "values", x, y, width, height }), 60);
-  }
-  sheet.changed = askNumbers;
+  // src/keys.ts
   var CHANNELS = ["beauty", "albedo", "normal", "depth", "uv", "variance", "ids"];
   var VIEWS = { 1: "front", 3: "right", 7: "top" };
-  function key(event) {
+  var EXPOSURE_STEP = 0.5;
+  var ZOOM_STEP = 1.5;
+  function pressKey(app2, event) {
+    const { page: page2, sheet: sheet2, views, tree, picked } = app2;
     const pressed = event.key.toLowerCase();
     const digit = /^(?:Digit|Numpad)([0-9])$/.exec(event.code)?.[1] ?? pressed;
     const channel = event.shiftKey ? CHANNELS[Number(digit) - 1] : void 0;
     const view = VIEWS[digit];
-    if (channel) page.set({ channel });
+    const exposure = page2.state?.exposure ?? 0;
+    if (channel) page2.set({ channel });
     else if (view) views.show(event.ctrlKey ? Views.opposite(view) : view);
     else if (event.ctrlKey) return false;
     else if (digit === "9") views.turn();
-    else if (pressed === "r") page.reset(page.state?.camera ?? 0);
-    else if (pressed === "x") explanation.show();
-    else if (pressed === "m") measure.toggle();
+    else if (pressed === "r") page2.reset(page2.state?.camera ?? 0);
+    else if (pressed === "x") app2.explanation.show();
+    else if (pressed === "m") app2.measure.toggle();
     else if (pressed === "h" && picked) tree.hide(picked.shape);
     else if (pressed === "i" && picked) tree.isolate(picked.shape);
-    else if (pressed === "p") page.set({ paused: !page.state?.paused });
-    else if (digit === "0") sheet.zoomOut();
-    else if (pressed === "+" || pressed === "=") sheet.zoomBy(1.5);
-    else if (pressed === "-") sheet.zoomBy(1 / 1.5);
-    else if (pressed === "[") page.set({ exposure: (page.state?.exposure ?? 0) - 0.5 });
-    else if (pressed === "]") page.set({ exposure: (page.state?.exposure ?? 0) + 0.5 });
+    else if (pressed === "p") page2.set({ paused: !page2.state?.paused });
+    else if (digit === "0") sheet2.zoomOut();
+    else if (pressed === "+" || pressed === "=") sheet2.zoomBy(ZOOM_STEP);
+    else if (pressed === "-") sheet2.zoomBy(1 / ZOOM_STEP);
+    else if (pressed === "[") page2.set({ exposure: exposure - EXPOSURE_STEP });
+    else if (pressed === "]") page2.set({ exposure: exposure + EXPOSURE_STEP });
     else if (pressed === "?") byId("help").showModal();
     else return false;
     return true;
   }
-  attach(sheet.picture, sheet, camera, {
-    moved: () => page.moved(),
-    key,
-    pick(x, y, turns) {
-      const request = page.ask({ type: "pick", x, y });
-      if (turns) turnAround = request;
-    },
-    hover(at) {
-      hovered = at;
-      if (at) askPixel();
-      else byId("pixel").textContent = "";
-    }
-  });
-  var ticket = (errand) => page.connection?.ticket(errand) ?? Promise.reject(new Error("not connected"));
-  var explanation = new Explanation(ticket);
-  var edit = (path, value) => page.send({ type: "edit", path, value });
-  var editor = new Editor(byId("parameters"), byId("filter"), edit);
-  var lights = new LightList(edit);
-  var tree = new SceneTree(page, select);
-  var views = new Views(page, camera);
-  var measure = new Measure(sheet);
-  var section = new Section(page);
-  var display = new Display(page);
-  page.onCamera = () => {
-    measure.moved();
-    section.moved();
-  };
-  function on(id, event, act) {
-    const input = byId(id);
-    input.addEventListener(event, () => act(input));
+
+  // src/saving.ts
+  var stem = (name) => (name || "picture").replace(/\.(pbrt|pov|gltf|glb|obj|ply|stl)(\.gz)?$/i, "");
+  function connectSaving(app2) {
+    const { page: page2, sheet: sheet2, camera: camera2, editor } = app2;
+    const name = () => page2.state?.name ?? "";
+    on("save-overlay", "click", () => save(`${page2.state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
+    on("drop-edits", "click", () => editor.dropAll());
+    on("snapshot", "click", async () => {
+      const picture = await sheet2.snapshot();
+      if (picture) saveBlob(`${stem(name())}.png`, picture);
+    });
+    const savePicture = async (format) => {
+      try {
+        const href = await page2.ticket({ for: "picture", format });
+        element("a", "", { href, download: `${stem(name())}.${format}` }).click();
+      } catch {
+        app2.alert("The picture was not saved.", "The viewer does not answer.");
+      }
+    };
+    on("save-png", "click", () => void savePicture("png"));
+    on("save-exr", "click", () => void savePicture("exr"));
+    on("copy-pbrt", "click", () => copy(camera2.toPbrt()));
+    on("copy-gltf", "click", () => copy(camera2.toGltf(sheet2.width / sheet2.height)));
   }
-  on("pause", "click", () => page.set({ paused: !page.state?.paused }));
-  on("reset", "click", () => page.reset(page.state?.camera ?? 0));
-  on("help-open", "click", () => byId("help").showModal());
-  on("help-close", "click", () => byId("help").close());
-  on("channel", "change", ({ value }) => page.set({ channel: value }));
-  on("exposure", "input", ({ value }) => page.set({ exposure: Number(value) }));
-  on("tone-map", "change", ({ value }) => page.set({ tone_map: value }));
-  on("false-colour", "change", ({ checked }) => page.set({ false_colour: checked }));
-  on("denoise", "change", ({ checked }) => page.set({ denoise: checked }));
-  on("scale", "change", ({ value }) => page.set({ scale: Number(value) }));
-  on("edit-picked", "click", () => picked?.owner && editor.reveal(picked.owner));
-  on("light-picked", "click", () => lights.reveal(picked?.owner ?? null));
-  on("find-picked", "click", () => picked && tree.reveal(picked.shape));
-  on("hide-picked", "click", () => picked && tree.hide(picked.shape));
-  on("isolate-picked", "click", () => picked && tree.isolate(picked.shape));
-  on("below-ground", "change", ({ checked }) => {
-    camera.mayGoBelow = checked;
-  });
-  on("noise-target", "change", (input) => input.checkValidity() && page.set({ noise: Number(input.value) }));
-  on("spp", "change", (input) => input.checkValidity() && page.set({ spp: Number(input.value) }));
-  on("camera", "change", ({ value }) => page.reset(Number(value)));
-  on("fov", "change", (input) => {
-    if (!input.checkValidity()) return;
-    camera.fov = Number(input.value);
-    page.moved();
-  });
-  var moment = (wishes) => page.send({ type: "moment", time: page.state?.time ?? null, variant: page.state?.variant ?? null, ...wishes });
-  on("animation-time", "input", ({ value }) => moment({ time: Number(value) }));
-  on("variant", "change", ({ value }) => moment({ variant: value || null }));
-  on("save-overlay", "click", () => save(`${page.state?.name ?? "scene"}.overlay.txt`, editor.overlay()));
-  on("drop-edits", "click", () => editor.dropAll());
-  var stem = () => (page.state?.name || "picture").replace(/\.(pbrt|pov|gltf|glb|obj|ply|stl)(\.gz)?$/i, "");
-  on("snapshot", "click", async () => {
-    const picture = await sheet.snapshot();
-    if (picture) saveBlob(`${stem()}.png`, picture);
-  });
-  async function savePicture(format) {
-    try {
-      const link = element("a", "", { href: await ticket({ for: "picture", format }), download: `${stem()}.${format}` });
-      link.click();
-    } catch {
-      alertOf("The picture was not saved.", "The viewer does not answer.");
-    }
-  }
-  on("save-png", "click", () => void savePicture("png"));
-  on("save-exr", "click", () => void savePicture("exr"));
   function copy(text) {
     const shown = byId("copied");
     [shown.hidden, shown.value] = [false, text];
@@ -1997,30 +2120,25 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     navigator.clipboard?.writeText(text).catch(() => {
     });
   }
-  on("copy-pbrt", "click", () => copy(camera.toPbrt()));
-  on("copy-gltf", "click", () => copy(camera.toGltf(sheet.width / sheet.height)));
-  function compare(is) {
-    byId("split").disabled = !is;
-    byId("forget").disabled = !is;
-    sheet.reference.hidden = !is;
-    if (is) sheet.split(Number(byId("split").value));
-  }
-  on("keep", "click", () => {
-    sheet.keep();
-    compare(true);
+
+  // src/main.ts
+  var data = globalThis.lumbreAtRest;
+  var app = new App(data !== void 0);
+  var { page, sheet, camera } = app;
+  var inbox = new Inbox(app);
+  page.connection = data ? new StaticConnection(inbox, data) : new Connection(inbox);
+  attach(sheet.picture, sheet, camera, {
+    moved: () => page.moved(),
+    key: (event) => pressKey(app, event),
+    pick(x, y, turns) {
+      const request = page.ask({ type: "pick", x, y });
+      if (turns) app.orbitOnPick = request;
+    },
+    hover: (at) => app.pixels.hover(at)
   });
-  on("forget", "click", () => compare(false));
-  on("split", "input", ({ value }) => sheet.split(Number(value)));
-  on("reference-file", "change", async ({ files }) => {
-    const file = files?.[0];
-    if (!file) return;
-    try {
-      sheet.keep(await createImageBitmap(file));
-      compare(true);
-    } catch {
-      alertOf("This is no picture that a browser can show.", file.name);
-    }
-  });
+  connectControls(app);
+  connectSaving(app);
+  connectComparing(app);
   if (data) hideWhatNeedsAViewer();
-  else new Drop(ticket, alertOf);
+  else new Drop((errand) => page.ticket(errand), app.alert);
 })();

@@ -1,11 +1,11 @@
 // The camera as it is moved by hand.
-import type { Placement, Scene, State } from "./protocol";
+import type { Placement, SceneFacts, ViewerState } from "./messages";
 import { add, cross, dot, length, scale, sub, turned, unit, type Vector } from "./vectors";
 
 /** How near the camera comes to straight above and below, in radians. */
 const POLE = 0.02;
 /** How near it comes to the ground, as a share of the distance to what it looks at. */
-const LEAST_HEIGHT = 0.01;
+const MIN_HEIGHT = 0.01;
 
 export class Camera {
   placement: Placement = { eye: [0, 0, 1], target: [0, 0, 0], up: [0, 1, 0] };
@@ -14,12 +14,12 @@ export class Camera {
   mirrored = false;
   /** Whether it may go below the ground. */
   mayGoBelow = false;
-  private ground: Scene["ground"] = null;
+  private ground: SceneFacts["ground"] = null;
   /** What stays upwards while the camera turns. */
   private axis: Vector = [0, 1, 0];
 
   /** That of a state; what stays upwards is found anew. */
-  take(state: State, scene: Scene): void {
+  take(state: ViewerState, scene: SceneFacts): void {
     if (!state.placement) return;
     const own = scene.cameras[state.camera];
     this.placement = state.placement;
@@ -46,7 +46,7 @@ export class Camera {
   /** Comes out of the ground, the target with the eye or alone. */
   private rise(withTarget: boolean): void {
     if (this.mayGoBelow || !this.ground) return;
-    const least = LEAST_HEIGHT * this.distance();
+    const least = MIN_HEIGHT * this.distance();
     const missing = least - this.height(this.placement.eye);
     if (missing <= 0) return;
     const step = scale(unit(this.ground.normal), missing);
@@ -78,7 +78,7 @@ export class Camera {
   }
 
   /** An axis that the picture does not lean to the side of; pbrt files do not say which is up. */
-  private upright(scene: Scene, unsaid: boolean): Vector {
+  private upright(scene: SceneFacts, unsaid: boolean): Vector {
     const [right, up] = [this.right(), this.upward()];
     const axes: Vector[] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
     const candidates = [...axes, ...axes.map((axis) => scale(axis, -1)), scene.up];
@@ -111,7 +111,7 @@ export class Camera {
     const { ground } = this;
     if (this.mayGoBelow || !ground || dot(unit(ground.normal), this.axis) < 0.999) return Math.PI;
     const reach = this.distance();
-    const drop = (LEAST_HEIGHT * reach - this.height(this.placement.target)) / reach;
+    const drop = (MIN_HEIGHT * reach - this.height(this.placement.target)) / reach;
     return Math.acos(Math.max(-1, Math.min(1, drop)));
   }
 

@@ -1,10 +1,11 @@
-// The socket, which comes back by itself. Page and viewer prove to each other that they know a secret, which is never sent: who takes the
-// port when the viewer has ended learns nothing.
+// The connection to the viewer; it reconnects by itself. Page and viewer prove to each other that they know a secret,
+// which is never sent: a program that takes the port after the viewer has ended learns nothing.
+import { decoded, type Frame } from "./frame";
+import type { Access, Errand, PageGreeting, PageMessage, ViewerGreeting, ViewerMessage } from "./messages";
 import { digits, proof } from "./proof";
-import { decoded, type Frame, type Message } from "./protocol";
 
 export interface Listener {
-  onMessage(message: Message): void;
+  onMessage(message: ViewerMessage): void;
   onFrame(frame: Frame): void;
   /** The viewer lets this page in. */
   onOpen(access: Access): void;
@@ -12,26 +13,12 @@ export interface Listener {
   onStatus(how: "gone" | "refused" | "foreign"): void;
 }
 
-/** What a page asks an address for, which works once. */
-export type Errand =
-  | { for: "picture"; format: "png" | "exr" }
-  | { for: "explanation"; language: string; pixel: [number, number] }
-  | { for: "scene" };
-
-/** What is said before a page is let in. */
-type Greeting =
-  | { type: "challenge"; nonce: string }
-  | { type: "welcome"; proof: string; session: string | null; access: Access };
-
-/** What this page may do: all, or look on. */
-export type Access = "edit" | "watch";
-
-/** The code with which a page is sent away. */
+/** The close code for a page that the viewer does not know. */
 const UNKNOWN = 4403;
-/** Its name in the storage of this origin: this host and this port. */
+/** The name of the secret in the storage of this origin, which is this host and this port. */
 const SECRET = "lumbre-session";
 
-/** The secret that this page has: that of the session, or the token of the address, which stands in no history. */
+/** The secret that this page has: that of the session, or the token of the address, which is removed from the history. */
 function secret(): string | null {
   const token = /^#([0-9a-f]{64})$/.exec(location.hash)?.[1];
   if (token) {
@@ -47,10 +34,10 @@ export class Connection {
   private again = 0;
   private isIn = false;
   private requests = 0;
-  private readonly waiting = new Map<number, (address: string) => void>();
+  private readonly waiting = new Map<number, (address: string | null) => void>();
 
   constructor(private readonly listener: Listener) {
-    // The page has to be there before it is told anything.
+    // The parts of the page are made first.
     setTimeout(() => this.connect());
     // The address was opened again in this tab, by another token.
     addEventListener("hashchange", () => {
@@ -62,7 +49,7 @@ export class Connection {
     });
   }
 
-  send(message: object): void {
+  send(message: PageMessage): void {
     if (this.isIn && this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
 
@@ -70,8 +57,8 @@ export class Connection {
   ticket(errand: Errand): Promise<string> {
     if (!this.isIn) return Promise.reject(new Error("not connected"));
     const request = ++this.requests;
-    return new Promise((found) => {
-      this.waiting.set(request, found);
+    return new Promise((found, failed) => {
+      this.waiting.set(request, (address) => (address === null ? failed(new Error("no address")) : found(address)));
       this.send({ type: "ticket", request, errand });
     });
   }
@@ -88,10 +75,11 @@ export class Connection {
     this.socket = socket;
     const nonce = digits(crypto.getRandomValues(new Uint8Array(32)));
     let challenge = "";
-    const greet = (message: Greeting): boolean => {
+    const greet = (message: ViewerGreeting): boolean => {
       if (message.type === "challenge" && !challenge && /^[0-9a-f]{64}$/.test(message.nonce)) {
         challenge = message.nonce;
-        socket.send(JSON.stringify({ type: "hello", nonce, proof: proof(known, "page", challenge, nonce) }));
+        const hello: PageGreeting = { type: "hello", nonce, proof: proof(known, "page", challenge, nonce) };
+        socket.send(JSON.stringify(hello));
         return true;
       }
       if (message.type !== "welcome" || !challenge || message.proof !== proof(known, "viewer", challenge, nonce)) return false;
@@ -114,18 +102,18 @@ export class Connection {
       if (!this.isIn) {
         let isViewer = false;
         try {
-          isViewer = typeof event.data === "string" && greet(JSON.parse(event.data) as Greeting);
+          isViewer = typeof event.data === "string" && greet(JSON.parse(event.data) as ViewerGreeting);
         } catch {
-          // What makes no sense comes from another program.
+          // Another program, which sends something else.
         }
-        // Which need not answer that it is closed.
         if (isViewer) return;
+        // Another program need not answer the close: the page reports it at once.
         lost("foreign");
         socket.close();
         return;
       }
       if (typeof event.data === "string") {
-        const message = JSON.parse(event.data) as Message;
+        const message = JSON.parse(event.data) as ViewerMessage;
         if (message.type === "ticket") {
           this.waiting.get(message.request)?.(message.address);
           this.waiting.delete(message.request);
@@ -135,7 +123,7 @@ export class Connection {
         return;
       }
       this.listener.onFrame(decoded(event.data));
-      // The next one comes when this one is shown: what comes between is never sent.
+      // The viewer sends the next frame after this; it skips those in between.
       this.send({ type: "shown" });
     };
   }

@@ -1,13 +1,14 @@
-// How numbers become colours, and how bright the picture is.
+// The colours of numbers, their legend, and the histogram.
 import { byId, short } from "./elements";
 import type { Page } from "./page";
-import type { Frame, State } from "./protocol";
+import type { Frame } from "./frame";
+import type { ColourMap, ViewerState } from "./messages";
 
 /** Levels of a channel of the display. */
 const LEVELS = 256;
 
 /** Whether the channel is shown by the colours of a scale. */
-const hasScale = (state: State) =>
+const hasScale = (state: ViewerState) =>
   state.channel === "depth" || state.channel === "variance" || (state.channel === "beauty" && state.false_colour);
 
 /** How many pixels have each level, by channel. */
@@ -46,7 +47,7 @@ export class Display {
     };
     for (const id of ["range-low", "range-high"]) byId(id).addEventListener("change", range);
     byId("range-found").addEventListener("click", () => page.set({ range: [] }));
-    byId("map").addEventListener("change", () => page.set({ map: byId<HTMLSelectElement>("map").value }));
+    byId("map").addEventListener("change", () => page.set({ map: byId<HTMLSelectElement>("map").value as ColourMap }));
     byId("mark-clipped").addEventListener("change", () => this.redraw());
     byId("histogram-details").addEventListener("toggle", () => this.draw());
   }
@@ -57,13 +58,13 @@ export class Display {
     return byId<HTMLInputElement>("mark-clipped").checked ? { ...frame, pixels: marked(frame.pixels) } : frame;
   }
 
-  take(state: State): void {
+  take(state: ViewerState): void {
     for (const part of document.querySelectorAll<HTMLElement>(".scaled")) part.hidden = !hasScale(state);
     byId<HTMLSelectElement>("map").value = state.map;
     byId("legend").className = `scaled map-${state.map === "automatic" ? (state.channel === "depth" ? "near" : "rainbow") : state.map === "grey" && state.channel === "depth" ? "near" : state.map}`;
   }
 
-  /** What a frame says of itself. */
+  /** Shows the range and the histogram of the last frame. */
   draw(): void {
     const frame = this.last;
     if (!frame) return;
@@ -85,7 +86,7 @@ export class Display {
     const { width, height } = this.canvas;
     drawing.clearRect(0, 0, width, height);
     drawing.globalCompositeOperation = "lighter";
-    // The ends are told in words: they would hide all else.
+    // The ends are given in words: as bars they would dwarf the rest.
     const most = Math.max(1, ...counts.flatMap((count) => [...count.subarray(1, LEVELS - 1)]));
     counts.forEach((count, channel) => {
       drawing.fillStyle = ["#d03030", "#30a040", "#3060e0"][channel] ?? "#888";

@@ -1,11 +1,11 @@
 // Files and folders that are dropped on the page, in one request.
-import type { Errand } from "./connection";
 import { byId } from "./elements";
+import type { DroppedFile, Errand } from "./messages";
 
 interface Named { name: string; file: File }
 
 /** Bytes that the viewer takes. */
-const MOST_BYTES = 256 * 2 ** 20;
+const MAX_BYTES = 256 * 2 ** 20;
 
 /** All files of an entry: itself, or those in the folder. */
 async function filesOf(entry: FileSystemEntry): Promise<Named[]> {
@@ -36,7 +36,8 @@ async function dropped(data: DataTransfer): Promise<Named[]> {
 
 /** One request of many files: see `bundle.rs`. */
 export function bundled(files: Named[]): Blob {
-  const list = new TextEncoder().encode(JSON.stringify(files.map(({ name, file }) => ({ name, size: file.size }))));
+  const entries = files.map(({ name, file }): DroppedFile => ({ name, size: file.size }));
+  const list = new TextEncoder().encode(JSON.stringify(entries));
   const length = new DataView(new ArrayBuffer(4));
   length.setUint32(0, list.length, true);
   return new Blob(["LUMF", length, list, ...files.map(({ file }) => file)], { type: "application/octet-stream" });
@@ -67,7 +68,7 @@ export class Drop {
 
   private async send(files: Named[]): Promise<void> {
     if (files.length === 0) return;
-    if (files.reduce((sum, { file }) => sum + file.size, 0) > MOST_BYTES) {
+    if (files.reduce((sum, { file }) => sum + file.size, 0) > MAX_BYTES) {
       this.alert("The files were not opened.", "They are more than 256 MiB: open them from the command line.");
       return;
     }

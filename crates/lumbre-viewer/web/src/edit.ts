@@ -2,13 +2,13 @@
 import { toHex } from "./colour";
 import { byId, element, short } from "./elements";
 import { asOptions } from "./lights";
-import type { Parameter } from "./protocol";
+import type { ListedParameter } from "./messages";
 
 /** Parameters that are shown at a time. */
-const MOST = 60;
+const MAX_LISTED = 60;
 
 export class Editor {
-  private parameters: Parameter[] = [];
+  private parameters: ListedParameter[] = [];
   private settings = new Map<string, string>();
 
   constructor(
@@ -18,7 +18,7 @@ export class Editor {
     filter.addEventListener("input", () => this.draw());
   }
 
-  list(parameters: Parameter[]): void {
+  list(parameters: ListedParameter[]): void {
     // An edit has the scene built anew, with the same parameters: what is under the hand stays.
     if (JSON.stringify(parameters) === JSON.stringify(this.parameters)) return;
     this.parameters = parameters;
@@ -55,7 +55,7 @@ export class Editor {
     const wanted = this.filter.value.toLowerCase();
     const found = this.parameters.filter((p) => `${p.owner} ${p.name}`.toLowerCase().includes(wanted));
     const groups = new Map<string, HTMLElement>();
-    for (const parameter of found.slice(0, MOST)) {
+    for (const parameter of found.slice(0, MAX_LISTED)) {
       let group = groups.get(parameter.owner);
       if (!group) {
         group = element("fieldset");
@@ -65,13 +65,13 @@ export class Editor {
       }
       group.append(this.row(parameter));
     }
-    const rest = found.length - MOST;
+    const rest = found.length - MAX_LISTED;
     const more = rest > 0 ? [element("p", `${rest} more: find them by name.`, { className: "quiet" })] : [];
     const none = found.length === 0 ? [element("p", "No parameter has this name.", { className: "quiet" })] : [];
     this.panel.replaceChildren(...groups.values(), ...more, ...none);
   }
 
-  private row(parameter: Parameter): HTMLElement {
+  private row(parameter: ListedParameter): HTMLElement {
     const id = `parameter-${parameter.path}`;
     const row = element("div", "", { className: "parameter" });
     row.dataset["path"] = parameter.path;

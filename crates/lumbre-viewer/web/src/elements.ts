@@ -14,7 +14,7 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
-/** A number with so many digits that one can tell it apart. */
+/** A number with six digits. */
 export function short(value: number): string {
   return Number.isFinite(value) ? String(+value.toPrecision(6)) : String(value);
 }
@@ -26,7 +26,7 @@ export function large(value: number): string {
   return `${Math.round(value)}`;
 }
 
-/** Seconds as people say them. */
+/** A duration in words. */
 export function spoken(seconds: number): string {
   if (seconds < 1) return `${Math.round(seconds * 1000)} ms`;
   if (seconds < 90) return `${seconds.toFixed(seconds < 10 ? 1 : 0)} s`;
@@ -49,3 +49,9 @@ export function saveBlob(name: string, blob: Blob): void {
 
 /** Hands a text to the user as a file. */
 export const save = (name: string, text: string): void => saveBlob(name, new Blob([text], { type: "text/plain" }));
+
+/** Calls `act` at an event of an element. */
+export function on(id: string, event: string, act: (input: HTMLInputElement) => void): void {
+  const input = byId<HTMLInputElement>(id);
+  input.addEventListener(event, () => act(input));
+}

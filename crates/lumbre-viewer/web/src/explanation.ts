@@ -1,6 +1,6 @@
-// How the colour of a pixel comes about, as the viewer tells it: a page in a frame of no origin, which runs its own script alone.
-import type { Errand } from "./connection";
+// The explanation of a pixel's colour: a page of the viewer in a frame without an origin, which runs its own script alone.
 import { byId, element, options } from "./elements";
+import type { Errand } from "./messages";
 
 export class Explanation {
   private readonly dialog = byId<HTMLDialogElement>("explanation");
@@ -29,13 +29,13 @@ export class Explanation {
     this.draw();
   }
 
-  /** It is this pixel that is asked about. */
+  /** Chooses the pixel to explain. */
   of(x: number, y: number): void {
     this.pixel = [x, y];
     this.draw();
   }
 
-  /** Explains the pixel that was asked about. */
+  /** Shows the explanation of the chosen pixel. */
   show(): void {
     if (this.button.hidden) return;
     void this.load();

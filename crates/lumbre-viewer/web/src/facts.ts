@@ -1,11 +1,11 @@
-// What is in the scene, and what a ray meets.
+// The facts of the scene, and the hits of a ray.
 import { element, large, short, spoken } from "./elements";
-import type { Hit, Scene } from "./protocol";
+import type { ListedHit, SceneFacts } from "./messages";
 import { called } from "./tree";
 
 const point = (v: readonly number[]) => v.map(short).join(", ");
 
-export function showFacts(list: HTMLElement, warnings: HTMLElement, scene: Scene): void {
+export function showFacts(list: HTMLElement, warnings: HTMLElement, scene: SceneFacts): void {
   const counted = (kinds: Record<string, number>) =>
     Object.entries(kinds).map(([name, count]) => `${count} ${name}`).join(", ") || "none";
   const rows: [string, string][] = [
@@ -26,22 +26,23 @@ export function showFacts(list: HTMLElement, warnings: HTMLElement, scene: Scene
   }
 }
 
-export function showHits(panel: HTMLElement, hits: Hit[]): void {
+export function showHits(panel: HTMLElement, hits: ListedHit[]): void {
   const first = hits[0];
   if (!first) {
     panel.replaceChildren(element("p", "Nothing is there.", { className: "quiet" }));
     return;
   }
+  const { surface } = first;
   const rows: [string, string | undefined][] = [
     ["Shape", called(first)],
     ["Material", first.material ?? "none"],
-    ["Position", first.point && point(first.point)],
-    ["Normal", first.normal && point(first.normal)],
+    ["Position", surface ? point(surface.point) : undefined],
+    ["Normal", surface ? point(surface.normal) : undefined],
     ["Distance", short(first.distance)],
-    ["uv", first.uv && point(first.uv)],
-    ["Triangle", first.kind === "mesh" ? first.primitive?.toString() : undefined],
-    ["Instance", first.instance === null ? "none" : first.instance?.toString()],
-    ["Side", first.front === undefined ? undefined : first.front ? "outside" : "inside"],
+    ["uv", surface ? point(surface.uv) : undefined],
+    ["Triangle", surface && first.kind === "mesh" ? String(surface.primitive) : undefined],
+    ["Instance", surface ? String(surface.instance ?? "none") : undefined],
+    ["Side", surface ? (surface.front ? "outside" : "inside") : undefined],
   ];
   const table = element("table");
   for (const [name, text] of rows) {
@@ -51,12 +52,12 @@ export function showHits(panel: HTMLElement, hits: Hit[]): void {
     table.append(row);
   }
   panel.replaceChildren(table);
-  if (first.front === undefined) return;
+  if (!surface) return;
   const all = element("details");
   all.append(element("summary", `All ${hits.length} hits of this ray`));
   const list = element("ol");
   for (const hit of hits) {
-    list.append(element("li", `${short(hit.distance)}: shape ${called(hit)}, ${hit.material ?? "no material"}, ${hit.front ? "in" : "out"}`));
+    list.append(element("li", `${short(hit.distance)}: shape ${called(hit)}, ${hit.material ?? "no material"}, ${hit.surface?.front ? "in" : "out"}`));
   }
   all.append(list);
   panel.append(all);

@@ -1,7 +1,7 @@
 // The lights with their colour and power. Edits are kept by the viewer, as those of all parameters.
 import { fromHex, toHex } from "./colour";
 import { byId, element, short } from "./elements";
-import type { Parameter } from "./protocol";
+import type { ListedParameter } from "./messages";
 
 /** A colour as its brightest channel, and the colour that is left. */
 export function parted(light: number[]): { power: number; colour: number[] } {
@@ -23,12 +23,12 @@ function numbers(text: string): number[] {
 
 export class LightList {
   private readonly panel = byId("lights");
-  private lights: Parameter[] = [];
+  private lights: ListedParameter[] = [];
   private settings = new Map<string, string>();
 
   constructor(private readonly edit: (path: string, value: string | null) => void) {}
 
-  list(parameters: Parameter[]): void {
+  list(parameters: ListedParameter[]): void {
     const lights = parameters.filter(({ path, kind }) => kind === "light" || path === "light.area.scale");
     if (JSON.stringify(lights) === JSON.stringify(this.lights)) return;
     this.lights = lights;
@@ -56,12 +56,12 @@ export class LightList {
     found?.scrollIntoView({ block: "nearest" });
   }
 
-  private value(light: Parameter): number[] {
+  private value(light: ListedParameter): number[] {
     const set = this.settings.get(light.path);
     return set === undefined ? light.value ?? [1, 1, 1] : numbers(set);
   }
 
-  private row(light: Parameter): HTMLElement {
+  private row(light: ListedParameter): HTMLElement {
     const row = element("fieldset");
     [row.dataset["path"], row.dataset["owner"]] = [light.path, light.owner];
     row.append(element("legend", light.kind === "light" && light.path.startsWith("material.") ? `${light.owner}: ${light.name}` : light.owner));

@@ -1,6 +1,6 @@
 // The distance between two points of surfaces.
 import { byId, element, short } from "./elements";
-import type { Hit } from "./protocol";
+import type { ListedHit } from "./messages";
 import type { Sheet } from "./sheet";
 import { length, sub, type Vector } from "./vectors";
 
@@ -24,10 +24,10 @@ export class Measure {
   }
 
   /** Another point; a third one begins anew. */
-  take(x: number, y: number, hit: Hit | undefined): void {
-    if (!this.isOn || !hit?.point) return;
+  take(x: number, y: number, hit: ListedHit | undefined): void {
+    if (!this.isOn || !hit?.surface) return;
     if (this.points.length >= 2) this.points = [];
-    this.points.push({ at: [x, y], point: hit.point });
+    this.points.push({ at: [x, y], point: hit.surface.point });
     this.draw();
   }
 

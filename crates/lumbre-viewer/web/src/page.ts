@@ -1,13 +1,18 @@
-// What the page knows of the viewer, and what it says to it.
+// The state of the page: the last scene and state of the viewer, the camera, and the way to send messages.
 import { Camera } from "./camera";
 import type { Connection } from "./connection";
-import type { StaticConnection } from "./static-connection";
 import { byId } from "./elements";
-import type { Frame, Scene, State } from "./protocol";
+import type { Frame } from "./frame";
+import type { Errand, PageMessage, SceneFacts, SetOptions, ViewerState } from "./messages";
 import { Sheet } from "./sheet";
+import type { StaticConnection } from "./static-connection";
+
+/** Messages whose answer has their number. */
+type Asking<M> = M extends { type: "pick" | "values"; request: number } ? Omit<M, "request"> : never;
+export type Question = Asking<PageMessage>;
 
 /** Frames whose times are kept. */
-const MOST_TIMES = 2000;
+const MAX_TIMES = 2000;
 
 /** What the page measures of itself: milliseconds from a change to the first picture of it, and when frames came. */
 export const measured = {
@@ -25,32 +30,37 @@ export class Page {
     byId<HTMLCanvasElement>("numbers"), document.querySelector("#marks") as SVGElement,
   );
   readonly camera = new Camera();
-  scene: Scene | undefined;
-  state: State | undefined;
+  scene: SceneFacts | undefined;
+  state: ViewerState | undefined;
   connection: Connection | StaticConnection | undefined;
   connected = false;
-  /** Whether it only looks on. */
+  /** Whether it only watches. */
   watches = false;
   /** Called when the camera was moved by hand. */
   onCamera: () => void = () => {};
   private requests = 0;
   private isMoving = false;
-  // What the camera is at is counted, so that one knows which frame shows it. Others count from elsewhere.
+  // Changes of the camera are counted, so that a frame can say which it shows. Each page starts at its own number.
   private sequence = Math.floor(Math.random() * 0x7fff_0000);
   private mine = -1;
 
-  send(message: object): void {
+  send(message: PageMessage): void {
     this.connection?.send(message);
   }
 
+  /** An address for an errand, which works once. */
+  ticket(errand: Errand): Promise<string> {
+    return this.connection?.ticket(errand) ?? Promise.reject(new Error("not connected"));
+  }
+
   /** Sends a question, and returns the number by which its answer is known. */
-  ask(message: object): number {
+  ask(question: Question): number {
     this.requests += 1;
-    this.send({ ...message, request: this.requests });
+    this.send({ ...question, request: this.requests });
     return this.requests;
   }
 
-  set(options: object): void {
+  set(options: SetOptions): void {
     this.send({ type: "set", ...options });
   }
 
@@ -83,7 +93,7 @@ export class Page {
   }
 
   /** Takes the camera of the state, unless it was moved here: what comes back is older than what the hand does. */
-  takeCamera(state: State, scene: Scene): void {
+  takeCamera(state: ViewerState, scene: SceneFacts): void {
     const isOwn = state.moved && state.sequence === this.mine;
     if (!isOwn && !this.isMoving) this.camera.take(state, scene);
   }
@@ -92,7 +102,7 @@ export class Page {
     this.sheet.show(frame);
     const now = performance.now();
     measured.frames.push(now);
-    if (measured.frames.length > MOST_TIMES) measured.frames.splice(0, MOST_TIMES / 2);
+    if (measured.frames.length > MAX_TIMES) measured.frames.splice(0, MAX_TIMES / 2);
     measured.first ||= now;
     if (frame.isDenoised) measured.firstDenoised ||= now;
     else measured.noisy += 1;

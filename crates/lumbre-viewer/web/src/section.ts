@@ -1,12 +1,10 @@
 // A plane in front of which nothing is seen.
 import { byId } from "./elements";
+import type { Plane, ViewerState } from "./messages";
 import type { Page } from "./page";
-import type { State } from "./protocol";
 import { add, dot, scale, sub, type Vector } from "./vectors";
 
 const AXES: Record<string, Vector> = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
-
-interface Plane { point: Vector; normal: Vector }
 
 export class Section {
   private readonly axis = byId<HTMLSelectElement>("section-axis");
@@ -19,7 +17,7 @@ export class Section {
     this.draw();
   }
 
-  take({ section }: State): void {
+  take({ section }: ViewerState): void {
     this.shown = section;
     if (!section && document.activeElement !== this.axis) this.axis.value = "none";
     this.draw();

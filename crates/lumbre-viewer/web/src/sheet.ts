@@ -1,7 +1,8 @@
 // The picture on the page: frames of any resolution, zoom into the pixels, and a reference beside it.
-import type { Frame, Value } from "./protocol";
+import type { Frame } from "./frame";
+import type { PixelValue } from "./messages";
 
-const MOST_ZOOM = 256;
+const MAX_ZOOM = 256;
 /** From here on the numbers of pixels are written on them, in screen pixels a pixel. */
 export const NUMBERS_FROM = 32;
 
@@ -80,7 +81,7 @@ export class Sheet {
   /** Zooms about a place of the screen. */
   zoomBy(factor: number, x = this.stage.clientWidth / 2, y = this.stage.clientHeight / 2): void {
     const before = this.scale();
-    const after = Math.min(MOST_ZOOM, before * factor);
+    const after = Math.min(MAX_ZOOM, before * factor);
     this.zoom = after <= this.fit() ? 0 : after;
     const ratio = this.scale() / before;
     this.left = x - (x - this.left) * ratio;
@@ -125,7 +126,7 @@ export class Sheet {
     if (this.numbers.width > 1) [this.numbers.width, this.numbers.height] = [1, 1];
   }
 
-  writeNumbers(x0: number, y0: number, width: number, values: [Value, Value, Value][]): void {
+  writeNumbers(x0: number, y0: number, width: number, values: [PixelValue, PixelValue, PixelValue][]): void {
     const scale = this.scale();
     if (scale < NUMBERS_FROM) return;
     // Drawn for the screen, in a canvas that covers only what is seen.

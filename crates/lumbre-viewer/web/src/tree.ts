@@ -1,13 +1,13 @@
 // The shapes of the scene by name: selected, hidden, isolated.
 import { byId, element } from "./elements";
+import type { HiddenShapes, ListedShape, SceneFacts } from "./messages";
 import type { Page } from "./page";
-import type { Hidden, Scene, Thing } from "./protocol";
 
 /** Shapes that are listed at a time. */
-const MOST = 200;
+const MAX_LISTED = 200;
 
 /** What people call a shape. The ground has a number that says nothing. */
-export function called({ shape, kind, name }: Thing): string {
+export function called({ shape, kind, name }: ListedShape): string {
   if (kind === "ground") return kind;
   return name ? `${name} (${kind})` : `${kind} ${shape}`;
 }
@@ -16,22 +16,22 @@ export class SceneTree {
   private readonly panel = byId("tree");
   private readonly filter = byId<HTMLInputElement>("tree-filter");
   private readonly all = byId<HTMLButtonElement>("show-all");
-  private scene: Scene | undefined;
-  private hidden: Hidden = { shapes: [], others: false };
+  private scene: SceneFacts | undefined;
+  private hidden: HiddenShapes = { shapes: [], others: false };
   private selected = -1;
 
-  constructor(private readonly page: Page, private readonly onSelect: (thing: Thing) => void) {
+  constructor(private readonly page: Page, private readonly onSelect: (thing: ListedShape) => void) {
     this.filter.addEventListener("input", () => this.draw());
     this.all.addEventListener("click", () => this.send([], false));
   }
 
-  list(scene: Scene): void {
+  list(scene: SceneFacts): void {
     const isSame = JSON.stringify(scene.tree) === JSON.stringify(this.scene?.tree);
     this.scene = scene;
     if (!isSame) this.draw();
   }
 
-  take(hidden: Hidden): void {
+  take(hidden: HiddenShapes): void {
     this.hidden = hidden;
     this.all.disabled = hidden.shapes.length === 0;
     for (const row of this.panel.querySelectorAll<HTMLElement>("li")) this.mark(row);
@@ -79,9 +79,9 @@ export class SceneTree {
   private draw(): void {
     const wanted = this.filter.value.toLowerCase();
     const { groups = [], left_out = 0 } = this.scene?.tree ?? {};
-    const isWanted = (thing: Thing, group: string | null) =>
+    const isWanted = (thing: ListedShape, group: string | null) =>
       `${group ?? ""} ${called(thing)} ${thing.material ?? ""}`.toLowerCase().includes(wanted);
-    let left = MOST;
+    let left = MAX_LISTED;
     let rest = left_out;
     const parts = groups.flatMap(({ name, shapes }): HTMLElement[] => {
       const found = shapes.filter((thing) => isWanted(thing, name));
@@ -101,7 +101,7 @@ export class SceneTree {
     this.panel.replaceChildren(...parts, ...more, ...none);
   }
 
-  private row(thing: Thing): HTMLElement {
+  private row(thing: ListedShape): HTMLElement {
     const row = element("li");
     row.dataset["shape"] = String(thing.shape);
     const name = called(thing);

@@ -1,8 +1,8 @@
 // Standard views, and views that are kept.
 import type { Camera } from "./camera";
 import { byId, element } from "./elements";
+import type { Placement } from "./messages";
 import type { Page } from "./page";
-import type { Placement } from "./protocol";
 import { add, cross, dot, length, scale, sub, unit, type Vector } from "./vectors";
 
 /** Names of the standard views, as their buttons have them. */
