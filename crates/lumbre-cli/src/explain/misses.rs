@@ -141,9 +141,9 @@ pub(super) fn approach(shape: &Shape, map: &Transform, ray: &Ray) -> Option<Near
     }
     let (t, there) = (0.5 * (from + to), at(best.1));
     let (refined, coarse) = (distance(t).ok()?, best.0);
-    // Along a parallel line, all are as near: the differences are rounding.
-    let is_nearer = coarse - refined > 1e-15 * coarse;
-    let (distance, t) = if is_nearer { (refined, t) } else { (coarse, there) };
+    let (distance, t) = if refined <= coarse { (refined, t) } else { (coarse, there) };
+    // The search comes near to the first place, as along a parallel line, but not to it.
+    let t = if t - low < 1e-12 * (high - low) { low } else { t };
     distance.is_finite().then_some(Nearest { distance, t, in_object })
 }
 

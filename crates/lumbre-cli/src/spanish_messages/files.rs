@@ -1,4 +1,5 @@
-//! Sentences of the readers of images, grids, light profiles and measured materials, and of files of any kind, in both languages.
+//! Sentences of the readers of images, grids, light profiles and measured materials, and of files of any kind, in both
+//! languages.
 
 /// `{}` stands for what comes from the file, in the same order in both; `{=}` for what stays as it is.
 pub(super) const FILES: &[(&str, &str)] = &[
