@@ -1679,7 +1679,7 @@ fn a_grid_of_pbrt_v3_is_one_of_pbrt_v4_with_other_coefficients() {
 fn what_has_no_effect_is_said() {
     let medium = r#"MakeNamedMedium "m" "string type" "homogeneous" "string preset" "Coke""#;
     let (_, said) = warned(&format!("{medium} \"rgb sigma_a\" [1 1 1]"));
-    assert_eq!(said, ["warning: scene.pbrt:1:82: \"sigma_a\" is not used where a preset is given"],);
+    assert_eq!(said, ["warning: scene.pbrt:1:83: \"sigma_a\" is not used where a preset is given"],);
     let hair = r#"Material "hair" Shape "curve" "point3 P" [0 0 0 1 0 0 2 0 0 3 0 0]"#;
     assert_eq!(warned(hair).1, [""; 0]);
     let (_, said) = warned(&format!("{hair} Shape \"sphere\" Shape \"sphere\""));

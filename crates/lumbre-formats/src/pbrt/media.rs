@@ -264,18 +264,10 @@ impl Converter<'_, '_> {
         };
         let of_heat = params.string("temperaturename")?.unwrap_or("temperature").to_owned();
         let temperature = grid(&of_heat, Values::Finite)?;
-        // A file may have no temperatures, but what is said of them has no effect then.
-        let of_missing = ["temperaturename", "Lescale"].into_iter().chain(OF_HEAT);
-        let missing = match temperature {
-            None => of_missing.clone().find(|name| params.has(name)),
-            Some(_) => None,
-        };
-        let without_heat = missing.map(|said| -> Result<(&str, Diagnostic)> {
+        // A file may have no temperatures: it is said where they are asked for by a name of their own.
+        if temperature.is_none() && of_heat != "temperature" {
             let message = format!("the file has no grid {}: the medium does not glow", quoted(&of_heat));
-            Ok((said, Diagnostic::warning(message).expected(names()?)))
-        });
-        if let Some((said, message)) = without_heat.transpose()? {
-            self.warn(params.spot_of(said), message);
+            self.warn(params.spot_of("temperaturename"), Diagnostic::warning(message).expected(names()?));
         }
         let NanoGrid { grid: density, world_bounds: [mut low, mut high] } = density;
         let factor = Factor::Constant(params.float_at_least_zero("Lescale", 1.0)? as f32);

@@ -82,6 +82,7 @@ pub(super) fn special(page: &str, name: &str) -> Option<&'static str> {
         ("realistic", "lensfile") => r#""images/triplet.txt""#,
         ("realistic", "aperture") => r#""star""#,
         ("subsurface", "name") => r#""Skin1""#,
+        ("nanovdb", "temperaturename") => r#""density""#,
         ("nanovdb", "filename") => r#""images/cloud.nvdb""#,
         ("homogeneous" | "heterogeneous", "preset") => r#""Wholemilk""#,
         (_, "encoding") => r#""linear""#,
