@@ -156,11 +156,6 @@ pub enum GeometryDesc {
 }
 
 impl GeometryDesc {
-    /// One exact shape.
-    pub fn exact(shape: impl Into<Shape>) -> Self {
-        Self::Exact(shape.into())
-    }
-
     /// The name of its kind, in the scene language if that has one; `mesh` for the several ways to write a mesh.
     pub fn name(&self) -> &'static str {
         match self {
