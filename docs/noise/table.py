@@ -65,7 +65,7 @@ SCENES = {
     "slit": (32, 2048, 0.1, walls(0.02) + lamp(2000, "0 -1 4.5", 0.3) + BALL),
     "door ajar": (32, 2048, 0.1, walls(0.15) + 'LightSource "infinite" "rgb L" [1 1 1]\n' + BALL),
     "dark room, environment": (32, 2048, 0.1, walls(0.6) + 'LightSource "infinite" "string filename" "sky.pfm"\n' + BALL),
-    "ball": (32, 2048, 0.1, lamp(200, "0 -1 2.5", 0.1) + MATT + FLOOR + glass("0 0 .6", 0.6)),
+    "ball": (32, 16384, 0.1, lamp(200, "0 -1 2.5", 0.1) + MATT + FLOOR + glass("0 0 .6", 0.6)),
     "bulb": (16, 8192, 0.2, lamp(300, "0 0 1.6", 0.08) + glass("0 0 1.6", 0.3) + glass("0 0 1.6", 0.28) + MATT + FLOOR),
     "caustic": (16, 16384, 0.2, 'LightSource "infinite" "rgb L" [.02 .02 .02]\n' + lamp(1000, "0 -1 2.5", 0.1) + glass("0 -1 2.5", 0.24) + MATT + FLOOR),
 }

@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     /// How to measure: rmse (root mean square), relmse (squares relative to the reference's), mae (mean of absolute
     /// values), max (the largest), flip (what a person notices when the two alternate, 0 to 1), or ssim (structural
     /// similarity, 1 for equal pictures).
-    #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = one_of(&METRICS, Metric::from_name))]
+    #[arg(long, value_name = "NAME", default_value = "rmse", value_parser = one_of(&Metric::NAMES, Metric::from_name))]
     metric: Metric,
     /// Compare this part only: its left and top edge, its width and its height in pixels.
     #[arg(long, value_name = "X,Y,W,H", value_parser = units::region)]
@@ -52,13 +52,6 @@ pub(crate) struct Arguments {
     /// Memory limit.
     #[arg(long, value_name = "SIZE", value_parser = units::bytes)]
     max_memory: Option<u64>,
-}
-
-/// The names of metrics.
-pub(crate) const METRICS: [&str; 6] = ["rmse", "relmse", "mae", "max", "flip", "ssim"];
-
-fn metric_name(metric: Metric) -> &'static str {
-    METRICS.into_iter().find(|name| Metric::from_name(name) == Some(metric)).unwrap_or("the difference")
 }
 
 /// A difference with four decimals, or as many more as it takes to see that it is beyond the limit.
@@ -153,7 +146,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         replaced.say();
     }
     // A NaN is beyond every limit.
-    let name = metric_name(arguments.metric);
+    let name = arguments.metric.name();
     match (arguments.fail_above, arguments.fail_below) {
         (Some(limit), _) if difference.is_nan() || difference > limit => {
             say!("{name} {} is above --fail-above {limit}", shown_beyond(difference, |shown| shown > limit));

@@ -54,7 +54,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let prepared = lumbre::prepare(&mut desc, &Stage::default(), None);
     let scene = Scene::of_file(desc, &arguments.scene[0], &mut diagnostics)?;
     (info.bounds, info.memory_bytes) = (scene.info().bounds, scene.info().memory_bytes);
-    let predicted = Predicted::of(&scene, &prepared);
+    let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
+    let predicted = Predicted::of(&scene, &prepared, held);
     let caustics = caustics_not_found(&scene, &scene.options());
     if arguments.json {
         let animations = info.listing.animations.iter().map(|a| json!({ "name": a.name, "seconds": a.end }));
@@ -134,6 +135,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 struct Predicted {
     width: u32,
     height: u32,
+    /// The peak of the process: the program, the scene and the picture.
     bytes: u64,
     /// Measured.
     seconds_per_sample: f64,
@@ -141,13 +143,15 @@ struct Predicted {
 }
 
 impl Predicted {
-    /// As `lumbre render` makes it, where no option asks for another.
-    fn of(scene: &Scene, prepared: &Prepared) -> Result<Self, lumbre::Error> {
+    /// As `lumbre render` makes it, where no option asks for another. `held` bytes are the scene.
+    fn of(scene: &Scene, prepared: &Prepared, held: u64) -> Result<Self, lumbre::Error> {
+        // The program itself, with its tables and the columns of its threads.
+        const PROGRAM: u64 = 18 << 20;
         let options = prepared.options(scene, None, None);
         Ok(Self {
             width: options.width,
             height: options.height,
-            bytes: picture_bytes(&options)?,
+            bytes: picture_bytes(&options)?.saturating_add(held).saturating_add(PROGRAM),
             seconds_per_sample: scene.seconds_per_sample(&options)?,
             threads: rayon::current_num_threads(),
         })
@@ -157,7 +161,7 @@ impl Predicted {
 impl fmt::Display for Predicted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { width, height, bytes, seconds_per_sample: seconds, threads } = self;
-        write!(f, "{width}x{height}, {:.1} MiB, ", mebibytes(*bytes))?;
+        write!(f, "{width}x{height}, {:.0} MiB with its scene, ", mebibytes(*bytes))?;
         match seconds {
             0.1.. => write!(f, "{seconds:.2} s")?,
             _ => write!(f, "{:.1} ms", 1e3 * seconds)?,

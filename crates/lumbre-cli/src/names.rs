@@ -20,7 +20,7 @@ mod tests {
     use lumbre::{Feature, Ground};
 
     use crate::denoiser::Choice;
-    use crate::{diff, render};
+    use crate::render;
 
     #[test]
     fn every_name_that_is_listed_is_known() {
@@ -28,7 +28,7 @@ mod tests {
         assert!(render::SHADING_NORMALS.iter().all(|name| ShadingNormals::from_name(name).is_some()));
         assert!(ToneMap::NAMES.iter().all(|name| ToneMap::from_name(name).is_some()));
         assert!(Feature::NAMES.iter().all(|name| Feature::from_name(name).is_some()));
-        assert!(diff::METRICS.iter().all(|name| Metric::from_name(name).is_some()));
+        assert!(Metric::NAMES.iter().all(|name| Metric::from_name(name).is_some()));
         assert!(Choice::NAMES.iter().all(|name| Choice::from_name(name).is_some()));
         assert!(Ground::NAMES.iter().all(|name| Ground::from_name(name).is_some()));
     }

@@ -48,7 +48,7 @@ impl Thin {
         shapes.map(move |(shape, ends)| {
             budget.bytes(each as u64, "points and lines")?;
             Ok(match &self.colours {
-                None => GeometryDesc::exact(shape),
+                None => GeometryDesc::Exact(shape),
                 Some(_) => GeometryDesc::Coloured(Box::new(ColouredShape {
                     shape,
                     ends: ends.map(at),

@@ -43,6 +43,11 @@ impl Metric {
         }
     }
 
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
     /// Whether a larger value means that two images are more alike.
     pub fn is_similarity(self) -> bool {
         self == Self::Ssim
@@ -182,6 +187,7 @@ mod tests {
         let fine = image(&[[0.5, 0.5, -1.0], [0.5, 0.5, 2.0]]);
         for name in Metric::NAMES {
             let metric = Metric::from_name(name).unwrap();
+            assert_eq!(metric.name(), name);
             let equal = if metric.is_similarity() { 1.0 } else { 0.0 };
             assert_eq!(compare(&odd, &odd, metric).unwrap().value, equal, "{name}");
             if !matches!(metric, Metric::Flip | Metric::Ssim) {

@@ -125,7 +125,7 @@ fn differing(a: &Image, b: &Image) -> usize {
 
 #[test]
 fn only_smooth_meshes_differ_between_the_two_ways() {
-    let sphere = || GeometryDesc::exact(Sphere::new(CENTER, RADIUS).unwrap());
+    let sphere = || GeometryDesc::Exact(Sphere::new(CENTER, RADIUS).unwrap().into());
     for (name, ball, same) in
         [("flat", globe(6, false), true), ("exact", sphere(), true), ("smooth", globe(6, true), false)]
     {
@@ -149,7 +149,7 @@ fn only_smooth_meshes_differ_between_the_two_ways() {
 
 #[test]
 fn pbrt_mode_keeps_the_polygonal_terminator() {
-    let exact = GeometryDesc::exact(Sphere::new(CENTER, RADIUS).unwrap());
+    let exact = GeometryDesc::Exact(Sphere::new(CENTER, RADIUS).unwrap().into());
     let expected = shown(lit(exact), KINDS[0], ShadingNormals::Pbrt, 16);
     let [ours, pbrt] = WAYS.map(|way| {
         let found = shown(lit(globe(6, true)), KINDS[0], way, 16);

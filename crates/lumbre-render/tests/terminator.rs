@@ -73,7 +73,7 @@ fn difference(found: &Image, expected: &Image) -> f64 {
 fn a_coarse_sphere_with_smooth_normals_is_lit_as_a_sphere() {
     let integrators: [&dyn Integrator; 2] = [&Path::new(1), &Whitted::new(1)];
     for integrator in integrators {
-        let exact = || GeometryDesc::exact(Sphere::new(CENTER, RADIUS).unwrap());
+        let exact = || GeometryDesc::Exact(Sphere::new(CENTER, RADIUS).unwrap().into());
         let expected = shown(lit(exact()), integrator);
         // They were 0.0769, 0.0553, 0.0178 and 0.0041 when all rays started on the faces.
         for (bands, bound) in [(6, 0.067), (8, 0.041), (16, 0.01), (32, 0.0025)] {
@@ -123,7 +123,7 @@ fn only_what_stands_for_something_that_bulges_out_rises() {
         ("smooth, from without", globe(8, true), false, true),
         ("smooth, from within", globe(8, true), true, false),
         ("flat", globe(8, false), false, false),
-        ("exact", GeometryDesc::exact(Sphere::new(CENTER, RADIUS).unwrap()), false, false),
+        ("exact", GeometryDesc::Exact(Sphere::new(CENTER, RADIUS).unwrap().into()), false, false),
     ];
     for (name, geometry, is_within, expected) in cases {
         let scene = Scene::build(lit(geometry)).unwrap();

@@ -126,7 +126,7 @@ mod tests {
     fn ball(index: u32, material: u32) -> ShapeDesc {
         ShapeDesc {
             index,
-            geometry: GeometryDesc::exact(Sphere::new(DVec3::new(3.0, 7.0, -4.0), 2.5).unwrap()),
+            geometry: GeometryDesc::Exact(Sphere::new(DVec3::new(3.0, 7.0, -4.0), 2.5).unwrap().into()),
             world_from_object: Transform::IDENTITY,
             reverse_orientation: false,
             material: Some(MaterialId(material)),

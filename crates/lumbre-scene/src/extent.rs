@@ -216,7 +216,7 @@ mod tests {
         let ball = Sphere::new(DVec3::new(1.0, 2.0, 3.0), 2.5).unwrap();
         let inner = ObjectDesc {
             name: "inner".into(),
-            shapes: vec![shape(GeometryDesc::exact(ball), Transform::IDENTITY); 60],
+            shapes: vec![shape(GeometryDesc::Exact(ball.into()), Transform::IDENTITY); 60],
             instances: vec![],
         };
         let place = |object, x| InstanceDesc {

@@ -97,7 +97,7 @@ pub(crate) fn lay(desc: &mut SceneDesc) -> Result<Option<GroundDesc>, BuildError
     desc.shapes.reserve_exact(1);
     desc.shapes.push(ShapeDesc {
         index: SHAPE,
-        geometry: GeometryDesc::exact(plane),
+        geometry: GeometryDesc::Exact(plane.into()),
         world_from_object: Transform::IDENTITY,
         reverse_orientation: false,
         material: Some(MaterialId(desc.materials.len() as u32)),

@@ -314,7 +314,7 @@ mod tests {
         SceneDesc {
             shapes: vec![ShapeDesc {
                 index: 0,
-                geometry: GeometryDesc::exact(ball),
+                geometry: GeometryDesc::Exact(ball.into()),
                 world_from_object: Transform::IDENTITY,
                 reverse_orientation: false,
                 material: Some(MaterialId(0)),

@@ -32,7 +32,7 @@ fn shape(index: u32, geometry: GeometryDesc) -> ShapeDesc {
 }
 
 fn exact(shape: impl Into<Shape>) -> GeometryDesc {
-    GeometryDesc::exact(shape)
+    GeometryDesc::Exact(shape.into())
 }
 
 fn of_shapes(shapes: Vec<ShapeDesc>) -> SceneDesc {
@@ -103,7 +103,7 @@ fn rays_that_leave_a_flat_or_convex_surface_never_meet_it_again() {
         quads: vec![[0, 1, 2, 3]],
         ..MeshDesc::default()
     };
-    let geometries = shapes.into_iter().map(GeometryDesc::exact).chain([GeometryDesc::Mesh(Arc::new(quad))]);
+    let geometries = shapes.into_iter().map(GeometryDesc::Exact).chain([GeometryDesc::Mesh(Arc::new(quad))]);
     for geometry in geometries {
         // The inside of a paraboloid is hollow: only the outer side is convex.
         let is_hollow =

@@ -43,7 +43,7 @@ enum Form {
 impl ShapeBuilder {
     /// An exact shape.
     pub fn exact(shape: impl Into<Shape>) -> Self {
-        Self::new(GeometryDesc::exact(shape))
+        Self::new(GeometryDesc::Exact(shape.into()))
     }
 
     /// Curves with a width: hair, grass.

@@ -730,7 +730,7 @@ pub(super) fn compact(vertices: &mut Vertices, triangles: &mut [[u32; 3]]) {
 impl Vertices {
     /// A shape between two vertices, with their colours if they have any.
     pub(super) fn coloured(&self, shape: Shape, ends: [u32; 2]) -> GeometryDesc {
-        let Some(colours) = &self.colours else { return GeometryDesc::exact(shape) };
+        let Some(colours) = &self.colours else { return GeometryDesc::Exact(shape) };
         let ends = ends.map(|i| i as usize);
         GeometryDesc::Coloured(Box::new(ColouredShape {
             shape,

@@ -197,7 +197,7 @@ impl Converter<'_, '_> {
     fn form(&mut self, ty: &str, params: &Params, state: &State) -> Result<Option<Form>> {
         if let Some(made) = exact_shape(ty, params)? {
             return match made {
-                Ok(shape) => Ok(Some(GeometryDesc::exact(shape).into())),
+                Ok(shape) => Ok(Some(GeometryDesc::Exact(shape).into())),
                 Err(ShapeError::OutOfRange { parameter, found, expected }) => {
                     params.out_of_range(parameter, found, expected)
                 }

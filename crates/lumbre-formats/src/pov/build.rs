@@ -280,7 +280,7 @@ impl Builder {
         match solid {
             Solid::Exact { surface, .. } if leaf.regions.is_empty() => {
                 let shape: Shape = surface.shape().clone();
-                Some((GeometryDesc::exact(shape), surface.world_from_object(), is_around_eye))
+                Some((GeometryDesc::Exact(shape), surface.world_from_object(), is_around_eye))
             }
             Solid::Implicit { surface, world_from_object } if leaf.regions.is_empty() => {
                 Some((GeometryDesc::Custom(Arc::new(surface)), world_from_object, is_around_eye))

@@ -77,10 +77,11 @@ fn build_here(geometries: Vec<Geometry>, preset: Preset) -> Result<Tree, BuildEr
     } else {
         let mut primitives = Boxes::empty(packed);
         let mut rest = &mut primitives[..];
-        for survey in &parts.surveys {
+        // They are freed: a scene of many meshes has many.
+        for survey in std::mem::take(&mut parts.surveys) {
             if let GeometryKind::Mesh(mesh) = &geometries[survey.geometry as usize].kind {
                 let own = rest.split_off_mut(..survey.triangles).expect("they were counted");
-                box_triangles(mesh, survey, &tree_space, own);
+                box_triangles(mesh, &survey, &tree_space, own);
             }
         }
         for survey in &parts.clouds {
@@ -142,7 +143,7 @@ pub(crate) struct Survey {
     pub(crate) geometry: u32,
     /// Triangles that have an area.
     pub(crate) triangles: usize,
-    /// Those in each [`CHUNK`] triangles.
+    /// Those in each [`CHUNK`] triangles; empty if there is one chunk, as scenes have many small meshes.
     pub(crate) chunks: Vec<u32>,
 }
 
@@ -216,11 +217,12 @@ pub(crate) fn take_apart(geometries: &[Geometry]) -> Result<Parts, BuildError> {
     Ok(parts)
 }
 
-/// The boxes of all shapes and instances, by position; `None` for infinite geometry and other kinds.
+/// The boxes of all shapes and instances, by position; `None` for infinite geometry and other kinds. Empty if there are
+/// neither shapes nor instances.
 fn boxes_of(geometries: &[Geometry]) -> Vec<Option<Aabb>> {
-    let is_packed = |kind: &GeometryKind| matches!(kind, GeometryKind::Mesh(_) | GeometryKind::Spheres(_));
-    if geometries.iter().all(|geometry| is_packed(&geometry.kind)) {
-        return vec![None; geometries.len()];
+    let has_box = |kind: &GeometryKind| matches!(kind, GeometryKind::Shape(_) | GeometryKind::Instance(_));
+    if !geometries.iter().any(|geometry| has_box(&geometry.kind)) {
+        return Vec::new();
     }
     // A tree is often placed by many instances.
     let mut outlines: FxHashMap<usize, Outline> = FxHashMap::default();
@@ -331,15 +333,18 @@ fn survey_mesh(position: usize, mesh: &TriangleMesh) -> Result<(Survey, Aabb, Si
     };
     let chunks: Vec<_> =
         mesh.indices.par_chunks(CHUNK).with_min_len(least).enumerate().map(survey_chunk).collect();
-    let mut survey =
-        Survey { geometry: position as u32, triangles: 0, chunks: Vec::with_capacity(chunks.len()) };
+    let has_many_chunks = chunks.len() > 1;
+    let counts = Vec::with_capacity(if has_many_chunks { chunks.len() } else { 0 });
+    let mut survey = Survey { geometry: position as u32, triangles: 0, chunks: counts };
     let (mut bounds, mut longest_side) = (MeshBox::EMPTY, 0.0f32);
     for chunk in chunks {
         let (around, longest, count) = chunk?;
         bounds.grow(&around);
         longest_side = longest_side.max(longest);
         survey.triangles += count as usize;
-        survey.chunks.push(count);
+        if has_many_chunks {
+            survey.chunks.push(count);
+        }
     }
     if survey.triangles == 0 {
         return Ok((survey, Aabb::EMPTY, Sizes::default()));
@@ -489,15 +494,20 @@ impl Boxer {
 
 /// Writes the boxes of the triangles that have an area.
 fn box_triangles(mesh: &TriangleMesh, survey: &Survey, tree_space: &TreeSpace, mut places: &mut [Primitive]) {
+    let (boxer, isa) = (&Boxer::new(mesh, tree_space), Isa::best());
+    let geometry = survey.geometry;
+    if survey.chunks.is_empty() {
+        isa.run(BoxChunk { mesh, boxer, geometry, first: 0, places });
+        return;
+    }
     let chunks: Vec<(usize, &mut [Primitive])> = survey
         .chunks
         .iter()
         .enumerate()
         .map(|(chunk, &count)| (chunk, places.split_off_mut(..count as usize).expect("they were counted")))
         .collect();
-    let (boxer, isa) = (&Boxer::new(mesh, tree_space), Isa::best());
     chunks.into_par_iter().with_min_len(least_chunks(mesh)).for_each(|(chunk, places)| {
-        isa.run(BoxChunk { mesh, boxer, geometry: survey.geometry, first: chunk * CHUNK, places });
+        isa.run(BoxChunk { mesh, boxer, geometry, first: chunk * CHUNK, places });
     });
 }
 

@@ -50,7 +50,7 @@ pub(crate) fn add(desc: &mut SceneDesc, geometry: GeometryDesc, material: Materi
 }
 
 pub(crate) fn exact(shape: impl Into<Shape>) -> GeometryDesc {
-    GeometryDesc::exact(shape)
+    GeometryDesc::Exact(shape.into())
 }
 
 pub(crate) fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>, quads: Vec<[u32; 4]>) -> GeometryDesc {

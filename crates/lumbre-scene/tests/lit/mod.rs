@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{Disk, Shape, Sphere};
+use lumbre_geometry::{Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec3, Transform, Vec3};
@@ -61,7 +61,7 @@ pub(crate) fn lights_of_all_kinds(sky: Option<EnvironmentMapping>) -> Scene {
         (20..26)
             .map(|i| shining(i, rectangle_of_triangles(&mut random).0, 0.5 + random.next_f32(), i % 3 == 0)),
     );
-    let exact = |shape: Shape| GeometryDesc::exact(shape);
+    let exact = GeometryDesc::Exact;
     let v = DVec3::new;
     shapes.push(shining(
         12,
