@@ -526,14 +526,14 @@ impl Arguments {
 
     /// Rejects frames without an animation, and an output name that is the same for all frames.
     fn check_frames(&self, output: Option<&Path>) -> Result<(), Failure> {
-        let is_gltf = |path: &PathBuf| {
+        let has_frames = |path: &PathBuf| {
             let ending = path.extension().map(|e| e.to_ascii_lowercase()).unwrap_or_default();
-            ending == "gltf" || ending == "glb"
+            ending == "gltf" || ending == "glb" || ending == "pov"
         };
-        if self.frames.is_some() && !self.scene.iter().all(is_gltf) {
+        if self.frames.is_some() && !self.scene.iter().all(has_frames) {
             let path = self.scene[0].display();
             return Err(Failure::Usage(format!(
-                "{path}: --frames needs an animation (expected a .gltf or a .glb)"
+                "{path}: --frames needs an animation (expected a .gltf, a .glb or a .pov)"
             )));
         }
         let name = output.and_then(Path::file_name).map(|name| name.to_string_lossy());
@@ -683,6 +683,12 @@ fn picture(
             Ok(())
         }
     };
+    if is_of_light && kind != IntegratorKind::Pov && scene.resolved().pov().is_some_and(|world| world.has_media) {
+        warn(format!(
+            "{}: fog and media of POV-Ray are rendered by --integrator pov alone",
+            name.display()
+        ))?;
+    }
     if staged.framed && scene.resolved().accel().primitive_count() == 0 {
         warn(format!("{}: the scene has no shapes: the picture shows only the background", name.display()))?;
     }
