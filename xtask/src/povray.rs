@@ -335,16 +335,16 @@ fn difference(ours: &Picture, theirs: &Picture) -> (f64, f64) {
 
 /// Example scenes that both programs render alike, and that take POV-Ray long enough to be timed.
 const RACED: [&str; 10] = [
-    "advanced/chess2.pov",
+    "advanced/biscuit.pov",
+    "advanced/blocks/stackergold.pov",
+    "advanced/blocks/stackertransp.pov",
+    "advanced/infinitybox.pov",
+    "advanced/lamppost.pov",
     "advanced/woodbox.pov",
-    "advanced/wineglass.pov",
-    "advanced/newltpot.pov",
-    "advanced/fish13/fish13.pov",
-    "advanced/quilt1.pov",
-    "objects/sphere_sweep/sphsweep2.pov",
-    "objects/isosurfaces/isocacti.pov",
-    "textures/surfaces/ripples.pov",
-    "interior/ballbox.pov",
+    "bsp/Tango.pov",
+    "incdemo/shapes.pov",
+    "lights/arealit3.pov",
+    "textures/patterns/crackle3.pov",
 ];
 
 /// The time of example scenes.

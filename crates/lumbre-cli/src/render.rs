@@ -86,8 +86,8 @@ pub(crate) struct Arguments {
     /// The format of a picture on standard output: png by default.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(&WRITTEN, written_format))]
     output_format: Option<ImageFormat>,
-    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised; 4 for a scene
-    /// of POV-Ray, and 16 at edges.
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised; 8 for a scene
+    /// of POV-Ray.
     #[arg(long, value_name = "N", value_parser = units::whole(1..=u32::MAX))]
     spp: Option<u32>,
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
