@@ -258,7 +258,7 @@ impl PovWorld {
     pub fn sky_colour(&self, direction: DVec3) -> Spectrum {
         let eye = Eye { normal: -direction, direction: -direction, uv: DVec2::ZERO };
         let layers = self.sky.iter().map(|pigment| pigment.colour(direction, &eye));
-        if !self.old_sky {
+        if !self.old_sky || self.sky.is_empty() {
             return layers.fold(self.background, |below, colour| {
                 colour.rgb * colour.opacity(false) + below * colour.passing()
             });
@@ -314,11 +314,11 @@ impl PovFog {
         };
         let mut depth = if density == 0.0 { 0.0 } else { length * density / self.distance };
         if let Some((amount, scale)) = self.turbulence {
-            // One number for the whole way, by its middle, and the less the denser the fog is.
+            // One number for the whole way, by its middle, and the less the longer it is.
             let middle = origin + direction * (0.5 * length);
             let (octaves, generator) = &self.octaves;
             let thinned = (amount * octaves.turbulence(middle * scale, *generator)).min(1.0);
-            depth *= 1.0 - (-depth).exponential() * thinned;
+            depth *= 1.0 - (-length / self.distance).exponential() * thinned;
         }
         ((-depth).exponential() as f32).max(self.transmit)
     }

@@ -16,6 +16,9 @@ use super::patterns::Draft;
 use super::value::Value;
 use super::{Parser, Result};
 
+/// How strong the pattern of a normal is that does not say so.
+const DEFAULT_BUMPS: f64 = 0.5;
+
 pub(super) type FinishStatement = Finish;
 pub(super) type InteriorStatement = Interior;
 
@@ -264,7 +267,7 @@ impl Parser<'_, '_> {
     /// A normal up to a closing mark.
     pub(super) fn normal_body(&mut self, base: Option<Arc<Normal>>, end: u8) -> Result<Arc<Normal>> {
         let mut draft = Draft::new(None, Warps::default(), false);
-        let mut amount = 0.5;
+        let mut amount = DEFAULT_BUMPS;
         let mut accuracy = 0.02;
         let mut no_bump_scale = false;
         let mut special: Option<Rc<str>> = None;
@@ -304,6 +307,7 @@ impl Parser<'_, '_> {
             if let Some(found) = self.pattern_kind(&word)? {
                 draft.begin(found, self.settings.generator);
                 special = Some(word);
+                amount = DEFAULT_BUMPS;
                 continue;
             }
             if self.pattern_modifier(&word, &mut draft)? {
