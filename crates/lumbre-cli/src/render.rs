@@ -683,11 +683,11 @@ fn picture(
             Ok(())
         }
     };
-    if is_of_light && kind != IntegratorKind::Pov && scene.resolved().pov().is_some_and(|world| world.has_media) {
-        warn(format!(
-            "{}: fog and media of POV-Ray are rendered by --integrator pov alone",
-            name.display()
-        ))?;
+    if is_of_light
+        && kind != IntegratorKind::Pov
+        && scene.resolved().pov().is_some_and(|world| world.has_media)
+    {
+        warn(format!("{}: fog and media of POV-Ray are rendered by --integrator pov alone", name.display()))?;
     }
     if staged.framed && scene.resolved().accel().primitive_count() == 0 {
         warn(format!("{}: the scene has no shapes: the picture shows only the background", name.display()))?;

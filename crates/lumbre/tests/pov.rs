@@ -192,7 +192,8 @@ fn colour(scene: &str) -> [f32; 3] {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.pov");
     std::fs::write(&path, scene).unwrap();
-    let (desc, _) = open_scene(&path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{scene}: {error}"));
+    let (desc, _) =
+        open_scene(&path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{scene}: {error}"));
     let scene = Scene::from_description(desc).unwrap();
     let mut options = scene.options();
     (options.width, options.height) = (3, 3);
@@ -211,7 +212,8 @@ fn colours_are_those_of_povray() {
     let faded = |finish: &str, power: &str, rest: &str| {
         format!("{}\n{rest}", glass.replace("FINISH", finish).replace("POWER", power))
     };
-    let layers = "sky_sphere { pigment { rgbft <0.2,0.3,0.4,0.5,0.2> } pigment { rgbft <0.5,0.6,0.7,0.4,0.3> } }";
+    let layers =
+        "sky_sphere { pigment { rgbft <0.2,0.3,0.4,0.5,0.2> } pigment { rgbft <0.5,0.6,0.7,0.4,0.3> } }";
     let gathering = |settings: &str, finish: &str| {
         format!(
             "global_settings {{ radiosity {{ {settings} }} }} background {{ rgb <1,0.8,0.6> }} \
@@ -229,9 +231,8 @@ fn colours_are_those_of_povray() {
     let mirror = "box { <-3,-3,0>, <3,3,0.1> rotate x*45 translate z*10 pigment { rgb 0 } \
                   finish { ambient 0 diffuse 0 reflection 0.5 } } \
                   box { <-3,5,5>, <3,6,15> pigment { rgb 0 transmit 0.8 } finish { ambient 0 diffuse 0 } }";
-    let levels = |most: u32, scene: &str| {
-        format!("global_settings {{ max_trace_level {most} }} {behind} {scene}")
-    };
+    let levels =
+        |most: u32, scene: &str| format!("global_settings {{ max_trace_level {most} }} {behind} {scene}");
     let fog = |turbulence: &str| {
         format!(
             "plane {{ -z, 0 pigment {{ rgb 1 }} finish {{ ambient 1 diffuse 0 }} }} \
@@ -276,7 +277,11 @@ fn colours_are_those_of_povray() {
         (3.7, textured("texture { T finish { ambient 1 } }"), [1.0, 0.5, 0.25]),
         // Blocks that are not given are black beside pigments.
         (3.7, textured("texture { T } pigment { checker pigment { rgb 1 } translate 0.5*(x+y) }"), [0.5; 3]),
-        (3.7, textured("texture { T } pigment { checker pigment { rgb 1 } translate <0.5,1.5,0> }"), [0.0; 3]),
+        (
+            3.7,
+            textured("texture { T } pigment { checker pigment { rgb 1 } translate <0.5,1.5,0> }"),
+            [0.0; 3],
+        ),
     ] {
         let camera = if scene.contains("fog_type") {
             camera.replace("-10*z", "<-2.625,1,-10>")

@@ -10,7 +10,8 @@ use lumbre_math::{DVec3, Elementary, Transform, Vec2};
 use lumbre_scene::pov::{PovRadiosity, PovWorld};
 use lumbre_scene::{
     AreaLightDesc, Boundary, EnvironmentDesc, EnvironmentMapping, FilterDesc, GeometryDesc, IntegratorDesc,
-    IntegratorKind, LightDesc, MaterialId, MediumId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis, WithoutLight,
+    IntegratorKind, LightDesc, MaterialId, MediumId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis,
+    WithoutLight,
 };
 use lumbre_shading::medium::{HomogeneousMedium, Medium};
 use lumbre_shading::pov::{Interior, PovMaterial, Texture, TextureKind, UvForm};
@@ -115,9 +116,7 @@ impl Parser<'_, '_> {
     fn around(&self, scene: &mut SceneDesc, gamma: f32, eye: DVec3, around_eye: Vec<Arc<PovMaterial>>) {
         let settings = &self.settings;
         let background = self.background.map_or(Spectrum::BLACK, |[r, g, b]| Spectrum::new(r, g, b));
-        let is_filled = |named: &NamedMaterial| {
-            matches!(&named.material.kind, MaterialKind::Pov(material) if !material.interior.media.is_empty())
-        };
+        let is_filled = |named: &NamedMaterial| matches!(&named.material.kind, MaterialKind::Pov(material) if !material.interior.media.is_empty());
         let has_media =
             !self.fogs.is_empty() || !self.air.is_empty() || scene.materials.iter().any(is_filled);
         let world = PovWorld {

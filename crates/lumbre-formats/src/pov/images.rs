@@ -8,8 +8,8 @@ use lumbre_shading::pov::{Colour, ImageMap, ImageProjection, ImageSource};
 use super::lexer::Kind;
 use super::palette::Indexed;
 use super::{Parser, Result};
-use crate::{Diagnostic, Input};
 use crate::diagnostic::quoted;
+use crate::{Diagnostic, Input};
 
 impl Parser<'_, '_> {
     /// An image with what modifies it, up to its closing brace.
@@ -165,7 +165,8 @@ impl Parser<'_, '_> {
                 self.diagnostics.push(wrong);
             }
         }
-        let indices = indexed.filter(|indexed| (indexed.width, indexed.height) == (image.width, image.height));
+        let indices =
+            indexed.filter(|indexed| (indexed.width, indexed.height) == (image.width, image.height));
         Ok((image, indices.map(|indexed| indexed.indices)))
     }
 }

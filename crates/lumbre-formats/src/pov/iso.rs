@@ -12,8 +12,8 @@ use super::lexer::Kind;
 use super::objects::Form;
 use super::palette::Indexed;
 use super::{Parser, Result};
-use crate::{Diagnostic, Input};
 use crate::diagnostic::quoted;
+use crate::{Diagnostic, Input};
 
 /// Where a function of x, y and z is below a threshold, within a box or a sphere.
 #[derive(Clone, Debug)]

@@ -21,7 +21,8 @@ pub(super) struct Indexed {
 impl Indexed {
     /// The image of a file; `None` if it has no palette, or cannot be read.
     pub(super) fn read(bytes: &Input, budget: &Budget) -> Result<Option<Self>, FormatError> {
-        let image = if bytes.starts_with(b"GIF8") { from_gif(bytes, budget)? } else { from_png(bytes, budget)? };
+        let image =
+            if bytes.starts_with(b"GIF8") { from_gif(bytes, budget)? } else { from_png(bytes, budget)? };
         // Files may end early, and need not name all colours.
         Ok(image.filter(|image| image.indices.len() == (image.width as usize) * (image.height as usize)))
     }

@@ -130,7 +130,9 @@ impl<'s> Tracer<'s> {
     }
 
     fn trace(&self, traced: &Traced<'s>, record: &mut Record) -> Spectrum {
-        if traced.level + u32::from(traced.is_straight) >= self.world.max_trace_level || traced.weight < self.world.adc_bailout {
+        if traced.level + u32::from(traced.is_straight) >= self.world.max_trace_level
+            || traced.weight < self.world.adc_bailout
+        {
             return Spectrum::BLACK;
         }
         let direction = traced.ray.direction.normalize();
@@ -610,8 +612,7 @@ impl<'s> Tracer<'s> {
                     uv: material.surface_uv(there.surface.point, there.at.uv.as_dvec2()),
                 };
                 // A ray that begins at a surface may begin inside of a solid.
-                let is_inside =
-                    !there.front || inside.iter().any(|solid| solid.is_of_solid(material));
+                let is_inside = !there.front || inside.iter().any(|solid| solid.is_of_solid(material));
                 let mut passes = Spectrum::BLACK;
                 for (share, layers) in &material.stacks(there.surface.point, &eye, there.front) {
                     let mut stack = layers
