@@ -82,8 +82,8 @@ pub(crate) struct Arguments {
     /// The format of a picture on standard output: png by default.
     #[arg(long, value_name = "FORMAT", value_parser = one_of(&WRITTEN, written_format))]
     output_format: Option<ImageFormat>,
-    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised; 4 for a scene
-    /// of POV-Ray, and 16 at edges.
+    /// Samples per pixel. By default as many as the scene says, else 64; 16 for a model that is denoised; 8 for a scene
+    /// of POV-Ray.
     #[arg(long, value_name = "N", value_parser = units::whole(1..=u32::MAX))]
     spp: Option<u32>,
     /// Stop after this time, counted from the start (of each frame), as 90s, 2m or 1h30m.
@@ -422,14 +422,14 @@ impl Arguments {
 
     /// Rejects frames without an animation, and an output name that is the same for all frames.
     fn check_frames(&self, output: Option<&Path>) -> Result<(), Failure> {
-        let is_gltf = |path: &PathBuf| {
+        let has_frames = |path: &PathBuf| {
             let ending = path.extension().map(|e| e.to_ascii_lowercase()).unwrap_or_default();
-            ending == "gltf" || ending == "glb"
+            ending == "gltf" || ending == "glb" || ending == "pov"
         };
-        if self.frames.is_some() && !self.scene.iter().all(is_gltf) {
+        if self.frames.is_some() && !self.scene.iter().all(has_frames) {
             let path = self.scene[0].display();
             return Err(Failure::Usage(format!(
-                "{path}: --frames needs an animation (expected a .gltf or a .glb)"
+                "{path}: --frames needs an animation (expected a .gltf, a .glb or a .pov)"
             )));
         }
         let name = output.and_then(Path::file_name).map(|name| name.to_string_lossy());

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_math::{DVec2, DVec3, Elementary};
-use lumbre_shading::pov::{Media, Pigment, PovMaterial};
+use lumbre_shading::pov::{Eye, Media, NoiseGenerator, Octaves, Pigment, PovMaterial};
 use lumbre_shading::{Scatter, Spectrum};
 
 use crate::light::{LightPoint, LightSample};
@@ -220,16 +220,61 @@ pub struct PovWorld {
     pub background: Spectrum,
     /// The sky over it, the bottom layer first.
     pub sky: Vec<Arc<Pigment>>,
+    /// Whether the layers of the sky are blended by the rule before version 3.7.
+    pub old_sky: bool,
+    /// How surfaces light one another, if they do.
+    pub radiosity: Option<PovRadiosity>,
     /// Fogs.
     pub fogs: Vec<PovFog>,
     /// The wavelengths of red, green and blue for thin films.
     pub irid_wavelength: Spectrum,
     /// The media of the air.
     pub air: Vec<Media>,
+    /// Whether there is fog or are media, in the air or in solids: path tracers do not have them.
+    pub has_media: bool,
     /// The position of the scene's camera.
     pub eye: DVec3,
     /// The solids around the scene's camera.
     pub around_eye: Vec<Arc<PovMaterial>>,
+}
+
+/// Radiosity: the light that surfaces give one another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PovRadiosity {
+    /// From how many directions a surface that the camera sees gathers light.
+    pub count: u32,
+    /// How often light is passed on from surface to surface, at most.
+    pub bounces: u32,
+    /// A factor on the light that is gathered.
+    pub brightness: f32,
+    /// How much of its hue is lost, from 0 to 1.
+    pub grayness: f32,
+    /// Whether surfaces have their ambient light besides, as before version 3.7.
+    pub has_ambient: bool,
+}
+
+impl PovWorld {
+    /// The colour of the sky in a unit direction, in the working space.
+    pub fn sky_colour(&self, direction: DVec3) -> Spectrum {
+        let eye = Eye { normal: -direction, direction: -direction, uv: DVec2::ZERO };
+        let layers = self.sky.iter().map(|pigment| pigment.colour(direction, &eye));
+        if !self.old_sky || self.sky.is_empty() {
+            return layers.fold(self.background, |below, colour| {
+                colour.rgb * colour.opacity(false) + below * colour.passing()
+            });
+        }
+        // Layers do not tint one another; together they tint what is behind all of them.
+        let (mut sum, mut left) = (Spectrum::BLACK, 1.0);
+        let (mut tint, mut filter, mut transmit) = (Spectrum::WHITE, 1.0, 1.0);
+        for colour in layers.rev() {
+            sum += colour.rgb * (colour.opacity(false) * left);
+            left *= colour.filter + colour.transmit;
+            tint *= colour.rgb;
+            filter *= colour.filter;
+            transmit *= colour.transmit;
+        }
+        sum + self.background * (tint * filter + Spectrum::splat(transmit))
+    }
 }
 
 /// Fog over an infinite distance is that over this length.
@@ -250,6 +295,10 @@ pub struct PovFog {
     pub ground: Option<[f64; 2]>,
     /// The unit direction of height.
     pub up: DVec3,
+    /// By how much turbulence thins it, from 0, and a factor on the places where that is looked up.
+    pub turbulence: Option<(f64, DVec3)>,
+    /// The octaves of its turbulence, and their noise.
+    pub octaves: (Octaves, NoiseGenerator),
 }
 
 impl PovFog {
@@ -263,7 +312,14 @@ impl PovFog {
             None => 1.0,
             Some([offset, altitude]) => self.mean_density(origin, direction, length, offset, altitude),
         };
-        let depth = if density == 0.0 { 0.0 } else { length * density / self.distance };
+        let mut depth = if density == 0.0 { 0.0 } else { length * density / self.distance };
+        if let Some((amount, scale)) = self.turbulence {
+            // One number for the whole way, by its middle, and the less the longer it is.
+            let middle = origin + direction * (0.5 * length);
+            let (octaves, generator) = &self.octaves;
+            let thinned = (amount * octaves.turbulence(middle * scale, *generator)).min(1.0);
+            depth *= 1.0 - (-length / self.distance).exponential() * thinned;
+        }
         ((-depth).exponential() as f32).max(self.transmit)
     }
 

@@ -230,6 +230,10 @@ impl<'a> Built<'a> {
                 }
             }
         };
+        let has_media = scene.resolved().pov().is_some_and(|world| world.has_media);
+        if is_of_light && self.kind != IntegratorKind::Pov && has_media {
+            warn("fog and media of POV-Ray are rendered by --integrator pov alone")?;
+        }
         if prepared.staged().framed && scene.resolved().accel().primitive_count() == 0 {
             warn("the scene has no shapes: the picture shows only the background")?;
         }

@@ -7,8 +7,9 @@ use lumbre_math::{DVec3, Transform};
 /// Where the sum of the fields of all parts is above a threshold.
 #[derive(Clone, Debug)]
 pub(super) struct Blob {
-    pub threshold: f64,
-    pub parts: Vec<Ball>,
+    threshold: f64,
+    parts: Vec<Ball>,
+    bounds: Aabb,
 }
 
 /// A field about a segment: s (1 − d² / r²)² at a distance d below r.
@@ -134,10 +135,16 @@ struct Span {
 }
 
 impl Blob {
+    pub(super) fn new(threshold: f64, parts: Vec<Ball>) -> Self {
+        let all = parts.iter().map(Ball::bounds);
+        let bounds = all
+            .reduce(|a, b| Aabb { min: a.min.min(b.min), max: a.max.max(b.max) })
+            .unwrap_or(Aabb { min: DVec3::ZERO, max: DVec3::ONE });
+        Self { threshold, parts, bounds }
+    }
+
     pub(super) fn bounds(&self) -> Aabb {
-        let all = self.parts.iter().map(Ball::bounds);
-        all.reduce(|a, b| Aabb { min: a.min.min(b.min), max: a.max.max(b.max) })
-            .unwrap_or(Aabb { min: DVec3::ZERO, max: DVec3::ONE })
+        self.bounds
     }
 
     pub(super) fn contains(&self, p: DVec3) -> bool {
@@ -150,8 +157,7 @@ impl Blob {
 
     pub(super) fn roots(&self, ray: &Ray, out: &mut Roots) {
         // From the middle of the blob, where numbers are small.
-        let bounds = self.bounds();
-        let middle = 0.5 * (bounds.min + bounds.max);
+        let middle = 0.5 * (self.bounds.min + self.bounds.max);
         let shift = (middle - ray.origin).dot(ray.direction) / ray.direction.length_squared();
         let moved = Ray::new(ray.at(shift), ray.direction);
         let mut spans = Vec::new();
@@ -185,15 +191,13 @@ mod tests {
         let mut bent = Ball::new([DVec3::new(-0.2, 0.3, 0.0), DVec3::new(0.8, -0.2, 0.1)], 0.3, 0.6);
         bent.world_from_ball = Transform::translate(DVec3::new(0.1, 0.2, -0.1));
         let center = |x, y, z| [DVec3::new(x, y, z); 2];
-        let blob = Blob {
-            threshold: 0.5,
-            parts: vec![
-                Ball::new(center(0.0, 0.0, 0.0), 0.7, 1.0),
-                Ball::new(center(0.6, 0.3, 0.0), 0.6, 0.9),
-                Ball::new(center(0.3, 0.2, -0.5), 0.4, -0.8),
-                bent,
-            ],
-        };
+        let parts = vec![
+            Ball::new(center(0.0, 0.0, 0.0), 0.7, 1.0),
+            Ball::new(center(0.6, 0.3, 0.0), 0.6, 0.9),
+            Ball::new(center(0.3, 0.2, -0.5), 0.4, -0.8),
+            bent,
+        ];
+        let blob = Blob::new(0.5, parts);
         let mut hits = 0;
         for i in 0..400_u32 {
             let spread = |k: u32| f64::from((i * k) % 97) / 97.0 * 2.0 - 1.0;

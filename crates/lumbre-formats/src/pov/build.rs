@@ -7,12 +7,14 @@ use std::sync::Arc;
 use lumbre_geometry::Shape;
 use lumbre_image::{Image, Rgb};
 use lumbre_math::{DVec3, Elementary, Transform, Vec2};
-use lumbre_scene::pov::PovWorld;
+use lumbre_scene::pov::{PovRadiosity, PovWorld};
 use lumbre_scene::{
-    AreaLightDesc, EnvironmentDesc, EnvironmentMapping, FilterDesc, GeometryDesc, IntegratorDesc,
-    IntegratorKind, LightDesc, MaterialId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis, WithoutLight,
+    AreaLightDesc, Boundary, EnvironmentDesc, EnvironmentMapping, FilterDesc, GeometryDesc, IntegratorDesc,
+    IntegratorKind, LightDesc, MaterialId, MediumId, NamedMaterial, SceneDesc, ShapeDesc, UpAxis,
+    WithoutLight,
 };
-use lumbre_shading::pov::{Eye, Interior, PovMaterial, Texture, TextureKind, UvForm};
+use lumbre_shading::medium::{HomogeneousMedium, Medium};
+use lumbre_shading::pov::{Interior, PovMaterial, Texture, TextureKind, UvForm};
 use lumbre_shading::{Material, MaterialKind, Spectrum};
 
 use super::camera::CameraStatement;
@@ -51,6 +53,8 @@ struct Builder {
     problems: Vec<String>,
     /// Interiors of objects that were moved by what they are part of: one for all surfaces of a solid.
     moved_interiors: HashMap<(usize, MapBits), (Arc<Interior>, Arc<Interior>)>,
+    /// The media of interiors that fade light, by the addresses of these, which materials keep.
+    fadings: HashMap<usize, MediumId>,
     /// Whether dispersion was said to be left out.
     has_dispersion: bool,
     /// Where the camera is, and what it is inside of.
@@ -78,6 +82,7 @@ impl Parser<'_, '_> {
             group_count: 0,
             problems: Vec::new(),
             moved_interiors: HashMap::new(),
+            fadings: HashMap::new(),
             has_dispersion: false,
             eye: camera.location,
             around_eye: Vec::new(),
@@ -111,13 +116,21 @@ impl Parser<'_, '_> {
     fn around(&self, scene: &mut SceneDesc, gamma: f32, eye: DVec3, around_eye: Vec<Arc<PovMaterial>>) {
         let settings = &self.settings;
         let background = self.background.map_or(Spectrum::BLACK, |[r, g, b]| Spectrum::new(r, g, b));
+        let is_filled = |named: &NamedMaterial| matches!(&named.material.kind, MaterialKind::Pov(material) if !material.interior.media.is_empty());
+        let has_media =
+            !self.fogs.is_empty() || !self.air.is_empty() || scene.materials.iter().any(is_filled);
         let world = PovWorld {
+            has_media,
             ambient_light: settings.ambient_light,
             max_trace_level: settings.max_trace_level,
             adc_bailout: settings.adc_bailout,
             gamma,
             background,
             sky: self.sky.clone(),
+            old_sky: settings.version < 3.7,
+            radiosity: settings
+                .radiosity
+                .map(|radiosity| PovRadiosity { has_ambient: settings.version < 3.7, ..radiosity }),
             fogs: self.fogs.clone(),
             irid_wavelength: settings.irid_wavelength,
             air: self.air.clone(),
@@ -161,12 +174,7 @@ fn sky_image(world: &PovWorld) -> EnvironmentDesc {
             let phi = TAU * ((f64::from(column) + 0.5) / f64::from(WIDTH) - 0.5);
             let ((st, ct), (sp, cp)) = (theta.sine_cosine(), phi.sine_cosine());
             let direction = DVec3::new(st * cp, st * sp, ct);
-            let mut c = world.background;
-            for pigment in &world.sky {
-                let colour = pigment.colour(direction, &Eye::NOWHERE);
-                c = colour.rgb * colour.opacity(false) + c * colour.passing();
-            }
-            pixels.push(linear(c, world.gamma));
+            pixels.push(linear(world.sky_colour(direction), world.gamma));
         }
     }
     let image = Image::from_pixels(WIDTH, HEIGHT, pixels)
@@ -242,6 +250,9 @@ impl Builder {
         // What is infinite cannot be sampled as a light.
         let is_plane = matches!(leaf.object.form, Form::Plane(..));
         let area_light = if is_plane { None } else { self.glow(id) };
+        // What has no inside cannot be filled.
+        let is_open = matches!(&leaf.object.form, Form::Mesh(_, None));
+        let boundary = if is_open { None } else { self.fading(id) };
         let index = self.scene.shapes.len() as u32;
         self.scene.shapes.push(ShapeDesc {
             index,
@@ -249,7 +260,7 @@ impl Builder {
             world_from_object: map,
             reverse_orientation: false,
             material: Some(id),
-            boundary: None,
+            boundary,
             area_light,
             alpha: None,
         });
@@ -394,6 +405,35 @@ impl Builder {
         let material = Material::new(MaterialKind::Pov(Arc::new(material)));
         self.scene.materials.push(NamedMaterial { name: None, material: Arc::new(material) });
         id
+    }
+
+    /// What solids that fade light are filled with for path tracers: a medium that absorbs as much at the distance of
+    /// fading, if the solid is not to be seen as clear.
+    fn fading(&mut self, id: MaterialId) -> Option<Boundary> {
+        let MaterialKind::Pov(material) = &self.scene.materials[id.0 as usize].material.kind else {
+            return None;
+        };
+        let interior = &material.interior;
+        let distance = interior.fade_distance;
+        if distance <= 0.0 {
+            return None;
+        }
+        let key = Arc::as_ptr(interior) as usize;
+        let known = self.fadings.get(&key).copied();
+        let inside = known.unwrap_or_else(|| {
+            let left = interior.transmittance(distance).map(|c| c.clamp(1e-6, 1.0).power(self.gamma));
+            let medium = HomogeneousMedium {
+                extinction: left.map(|c| -c.logarithm() / distance),
+                albedo: Spectrum::BLACK,
+                asymmetry: 0.0,
+            };
+            let medium = Medium::Homogeneous { medium, glow: Spectrum::BLACK, spectra: None };
+            let made = MediumId(self.scene.media.len() as u32);
+            self.scene.media.push(Arc::new(medium));
+            self.fadings.insert(key, made);
+            made
+        });
+        Some(Boundary { inside: Some(inside), outside: None })
     }
 
     /// The light that a surface gives to path tracers: its emission, and ambient light where it scatters next to nothing.

@@ -169,7 +169,7 @@ impl Parser<'_, '_> {
     pub(super) fn camera_block(&mut self, mut camera: CameraStatement) -> Result<CameraStatement> {
         let outer = self.declaring.take();
         self.expect(b'{')?;
-        let mut is_aimed = false;
+        let mut moves = Vec::new();
         while !self.take(b'}')? {
             if self.take(b',')? {
                 continue;
@@ -179,10 +179,8 @@ impl Parser<'_, '_> {
                 Some("translate" | "rotate" | "scale" | "matrix" | "transform")
             );
             if is_transform && let Some(map) = self.transform()? {
-                if !std::mem::replace(&mut is_aimed, true) {
-                    camera.aim();
-                }
-                camera.move_by(&map);
+                self.budget.bytes(size_of_val(&map) as u64, "transforms of a camera")?;
+                moves.push(map);
                 continue;
             }
             let Some(word) = self.word()? else { return Err(self.unexpected("what a camera has")) };
@@ -238,7 +236,7 @@ impl Parser<'_, '_> {
                 _ => match self.known(&word)? {
                     Some(Value::Camera(known)) => {
                         camera = (*known).clone();
-                        is_aimed = true;
+                        moves.clear();
                     }
                     Some(other) => {
                         return Err(self.error(format!("a camera is needed, not {}", other.name())));
@@ -250,13 +248,14 @@ impl Parser<'_, '_> {
                 },
             }
         }
-        if !is_aimed {
-            camera.aim();
-            // What follows is in the place of what it looked at.
-            camera.look_at = None;
-            if camera.kind == Projection::Perspective {
-                camera.angle = None;
-            }
+        // Wherever they stand, transforms move what has been aimed.
+        camera.aim();
+        camera.look_at = None;
+        if camera.kind == Projection::Perspective {
+            camera.angle = None;
+        }
+        for map in moves {
+            camera.move_by(&map);
         }
         self.declaring = outer;
         Ok(camera)

@@ -6,14 +6,17 @@ use lumbre_shading::Spectrum;
 use lumbre_shading::pov::{Colour, ImageMap, ImageProjection, ImageSource};
 
 use super::lexer::Kind;
+use super::palette::Indexed;
 use super::{Parser, Result};
-use crate::Diagnostic;
 use crate::diagnostic::quoted;
+use crate::{Diagnostic, Input};
 
 impl Parser<'_, '_> {
     /// An image with what modifies it, up to its closing brace.
     pub(super) fn image_body(&mut self) -> Result<ImageMap> {
-        let mut image = self.image_source()?;
+        let (mut image, indices) = self.image_source()?;
+        // The filter or the transparency of single colours of its palette.
+        let mut of_colours: Vec<(bool, f64, f32)> = Vec::new();
         while !self.take(b'}')? {
             if self.take(b',')? {
                 continue;
@@ -40,10 +43,10 @@ impl Parser<'_, '_> {
                         let value = self.finite()? as f32;
                         if &*word == "filter" { image.filter = value } else { image.transmit = value }
                     } else {
-                        self.float()?;
+                        let index = self.float()?;
                         self.comma()?;
-                        self.float()?;
-                        self.warn("the transparency of single colours of a palette is not rendered");
+                        self.budget.bytes(size_of::<(bool, f64, f32)>() as u64, "colours of an image")?;
+                        of_colours.push((&*word == "filter", index, self.finite()? as f32));
                     }
                 }
                 "gamma" => {
@@ -58,10 +61,30 @@ impl Parser<'_, '_> {
                 _ => return Err(self.error(format!("{word} has no meaning for an image"))),
             }
         }
+        if !of_colours.is_empty()
+            && let ImageSource::Pixels(pixels) = &image.source
+        {
+            let Some(indices) = indices else {
+                self.warn("an image without a palette has no single colours that could be transparent");
+                return Ok(image);
+            };
+            let mut changed = self.budget.vec(pixels.len() as u64, "pixels")?;
+            for (pixel, own) in pixels.iter().zip(&indices) {
+                let mut pixel = *pixel;
+                for (is_filter, index, value) in &of_colours {
+                    if *index == f64::from(*own) {
+                        *(if *is_filter { &mut pixel.filter } else { &mut pixel.transmit }) = *value;
+                    }
+                }
+                changed.push(pixel);
+            }
+            image.source = ImageSource::Pixels(changed.into());
+        }
         Ok(image)
     }
 
-    fn image_source(&mut self) -> Result<ImageMap> {
+    /// An image with the indices of its pixels, if it has a palette.
+    fn image_source(&mut self) -> Result<(ImageMap, Option<Vec<u8>>)> {
         let mut image = ImageMap {
             source: ImageSource::Pixels(Arc::from([Colour::default()])),
             width: 1,
@@ -77,7 +100,7 @@ impl Parser<'_, '_> {
             self.comma()?;
             image.height = self.whole(2.0, 65_536.0)?;
             image.source = ImageSource::Function(self.function_block(&["x", "y", "z"])?);
-            return Ok(image);
+            return Ok((image, None));
         }
         // The kind is told by the file.
         if !matches!(self.peek()?, Some(Kind::Text(_)))
@@ -106,7 +129,20 @@ impl Parser<'_, '_> {
             let wrong = Diagnostic::error("an image that is not there").found(quoted(&name));
             return Err(self.diagnostic(wrong).into());
         };
-        let read = crate::image::open_image(&path, self.budget, self.diagnostics);
+        let input = Input::open(&path, self.budget)?;
+        let indexed = Indexed::read(&input, self.budget)?;
+        if let Some(indexed) = indexed.as_ref().filter(|_| input.starts_with(b"GIF")) {
+            (image.width, image.height) = (indexed.width, indexed.height);
+            let mut pixels = self.budget.vec(indexed.indices.len() as u64, "pixels")?;
+            pixels.extend((0..indexed.indices.len()).map(|i| {
+                let [r, g, b] = indexed.colour(i).map(|c| f64::from(c) / 255.0);
+                let [r, g, b, ..] = self.settings.from_srgb([r, g, b, 0.0, 0.0]);
+                Colour::opaque(Spectrum::new(r as f32, g as f32, b as f32))
+            }));
+            image.source = ImageSource::Pixels(pixels.into());
+            return Ok((image, Some(indexed.indices.clone())));
+        }
+        let read = crate::image::read_image(&input, input.name(), self.budget, self.diagnostics);
         match read.and_then(|file| file.to_image(self.budget)) {
             Ok(read) => {
                 (image.width, image.height) = (read.width(), read.height());
@@ -129,6 +165,8 @@ impl Parser<'_, '_> {
                 self.diagnostics.push(wrong);
             }
         }
-        Ok(image)
+        let indices =
+            indexed.filter(|indexed| (indexed.width, indexed.height) == (image.width, image.height));
+        Ok((image, indices.map(|indexed| indexed.indices)))
     }
 }

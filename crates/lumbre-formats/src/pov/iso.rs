@@ -10,9 +10,10 @@ use lumbre_shading::pov::Function;
 use super::heights::{Heights, LEVELS};
 use super::lexer::Kind;
 use super::objects::Form;
+use super::palette::Indexed;
 use super::{Parser, Result};
-use crate::Diagnostic;
 use crate::diagnostic::quoted;
+use crate::{Diagnostic, Input};
 
 /// Where a function of x, y and z is below a threshold, within a box or a sphere.
 #[derive(Clone, Debug)]
@@ -303,7 +304,11 @@ impl Parser<'_, '_> {
             let wrong = Diagnostic::error("an image that is not there").found(quoted(&name));
             return Err(self.diagnostic(wrong).into());
         };
-        let file = crate::image::open_image(&path, self.budget, self.diagnostics)?;
+        let input = Input::open(&path, self.budget)?;
+        if let Some(indexed) = Indexed::read(&input, self.budget)? {
+            return self.indexed_heights(&indexed, kind.as_deref() == Some("pot"));
+        }
+        let file = crate::image::read_image(&input, input.name(), self.budget, self.diagnostics)?;
         let bitmap = &file.bitmap;
         let (width, height) = (bitmap.width(), bitmap.height());
         if width < 2 || height < 2 {
@@ -317,6 +322,23 @@ impl Parser<'_, '_> {
             }
         }
         Ok(([width, height], heights))
+    }
+
+    /// Heights by the indices of an image; the right half of a .pot has what is behind the point of the left one.
+    fn indexed_heights(&mut self, image: &Indexed, is_pot: bool) -> Result<([u32; 2], Vec<f32>)> {
+        let width = if is_pot { image.width / 2 } else { image.width };
+        if width < 2 || image.height < 2 {
+            return Err(self.error("the image of a height field has two columns and rows or more"));
+        }
+        let mut heights = self.budget.vec(u64::from(width) * u64::from(image.height), "heights")?;
+        for row in image.indices.chunks_exact(image.width as usize) {
+            let (whole, part) = row.split_at(width as usize);
+            heights.extend((0..width as usize).map(|x| {
+                let part = if is_pot { part[x] } else { 0 };
+                f32::from(whole[x]) * 256.0 + f32::from(part)
+            }));
+        }
+        Ok(([width, image.height], heights))
     }
 }
 

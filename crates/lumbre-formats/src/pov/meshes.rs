@@ -294,7 +294,7 @@ impl Parser<'_, '_> {
 
     /// A blob, up to what modifies it.
     pub(super) fn blob(&mut self) -> Result<Object> {
-        let mut blob = Blob { threshold: 1.0, parts: Vec::new() };
+        let (mut threshold, mut parts) = (1.0, Vec::new());
         let mut textured = false;
         loop {
             let word = self.word()?;
@@ -303,14 +303,14 @@ impl Parser<'_, '_> {
             };
             self.peeked = None;
             match word {
-                "threshold" => blob.threshold = self.finite()?,
+                "threshold" => threshold = self.finite()?,
                 "component" => {
                     let strength = self.finite()?;
                     self.comma()?;
                     let radius = self.finite()?;
                     self.comma()?;
                     let center = self.vector()?;
-                    blob.parts.push(Ball::new([center, center], radius, strength));
+                    parts.push(Ball::new([center, center], radius, strength));
                 }
                 _ => {
                     self.expect(b'{')?;
@@ -327,7 +327,7 @@ impl Parser<'_, '_> {
                     textured |= ball.texture.is_some();
                     let mut part = Ball::new([from, to], radius, strength);
                     part.world_from_ball = ball.transform;
-                    blob.parts.push(part);
+                    parts.push(part);
                 }
             }
             self.budget.bytes(size_of::<Ball>() as u64, "parts of a blob")?;
@@ -335,10 +335,10 @@ impl Parser<'_, '_> {
         if textured {
             self.warn("the textures of the parts of a blob are not rendered");
         }
-        if blob.parts.is_empty() {
+        if parts.is_empty() {
             return Err(self.error("a blob without parts"));
         }
-        Ok(Object::new(Form::Blob(Arc::new(blob))))
+        Ok(Object::new(Form::Blob(Arc::new(Blob::new(threshold, parts)))))
     }
 }
 

@@ -25,6 +25,7 @@ mod media;
 mod mesh_tree;
 mod meshes;
 mod objects;
+mod palette;
 mod patches;
 mod patterns;
 mod settings;

@@ -4,9 +4,9 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_math::{DVec3, Elementary};
-use lumbre_scene::pov::PovFog;
+use lumbre_scene::pov::{PovFog, PovRadiosity};
 use lumbre_shading::Spectrum;
-use lumbre_shading::pov::{NoiseGenerator, Pigment};
+use lumbre_shading::pov::{NoiseGenerator, Octaves, Pigment};
 
 use super::patterns::generator;
 use super::value::Value;
@@ -26,7 +26,7 @@ pub(super) struct Settings {
     pub generator: NoiseGenerator,
     pub has_generator: bool,
     pub irid_wavelength: Spectrum,
-    pub radiosity: bool,
+    pub radiosity: Option<PovRadiosity>,
 }
 
 pub(super) type Fog = PovFog;
@@ -47,7 +47,7 @@ impl Settings {
             generator: NoiseGenerator::Corrected,
             has_generator: false,
             irid_wavelength: Spectrum::new(0.70, 0.52, 0.48),
-            radiosity: false,
+            radiosity: None,
         }
     }
 
@@ -120,14 +120,13 @@ impl Parser<'_, '_> {
                 "charset" => {
                     self.next()?;
                 }
-                "radiosity" | "photons" | "subsurface" => {
-                    self.settings.radiosity |= &*word == "radiosity";
+                "radiosity" => self.settings.radiosity = Some(self.radiosity_block()?),
+                "photons" | "subsurface" => {
                     if &*word != "subsurface" || self.is_mark(b'{')? {
                         self.expect(b'{')?;
                         self.skip_to(b'}')?;
                     }
                     let instead = match &*word {
-                        "radiosity" => ": --integrator path has the light that surfaces give each other",
                         "photons" => ": --integrator caustics has light that glass and mirrors gather",
                         _ => "",
                     };
@@ -137,6 +136,42 @@ impl Parser<'_, '_> {
             }
         }
         Ok(())
+    }
+
+    /// Radiosity in braces: what says how light is gathered; how POV-Ray keeps and reuses it is passed over.
+    fn radiosity_block(&mut self) -> Result<PovRadiosity> {
+        let mut radiosity =
+            PovRadiosity { count: 35, bounces: 2, brightness: 1.0, grayness: 0.0, has_ambient: false };
+        self.expect(b'{')?;
+        while !self.take(b'}')? {
+            if self.take(b',')? {
+                continue;
+            }
+            let Some(word) = self.word()? else { return Err(self.unexpected("a setting of radiosity")) };
+            self.peeked = None;
+            match &*word {
+                "count" => radiosity.count = self.whole(1.0, 1e6)?,
+                "recursion_limit" => radiosity.bounces = self.whole(1.0, 20.0)?,
+                "brightness" => radiosity.brightness = self.finite()? as f32,
+                "gray_threshold" => radiosity.grayness = self.finite()?.clamp(0.0, 1.0) as f32,
+                "normal" | "media" | "always_sample" | "subsurface" => {
+                    self.optional_bool()?;
+                }
+                "load_file" | "save_file" => {
+                    self.next()?;
+                }
+                "adc_bailout" | "distance_maximum" | "error_bound" | "low_error_factor" | "max_sample"
+                | "maximum_reuse" | "minimum_reuse" | "nearest_count" | "pretrace_end" | "pretrace_start" => {
+                    self.float()?;
+                }
+                _ => return Err(self.error(format!("{word} is no setting of radiosity"))),
+            }
+            // Further numbers of the same setting.
+            while self.take(b',')? {
+                self.float()?;
+            }
+        }
+        Ok(radiosity)
     }
 
     /// A fog in braces.
@@ -149,7 +184,10 @@ impl Parser<'_, '_> {
             transmit: 0.0,
             ground: None,
             up: DVec3::Y,
+            turbulence: None,
+            octaves: (Octaves::default(), self.settings.generator),
         };
+        let (mut turbulence, mut turbulent_depth) = (DVec3::ZERO, 0.5);
         let (mut is_ground, mut offset, mut altitude) = (false, 0.0, 0.0);
         while !self.take(b'}')? {
             if self.take(b',')? {
@@ -171,16 +209,18 @@ impl Parser<'_, '_> {
                 "fog_offset" => offset = self.finite()?,
                 "fog_alt" => altitude = self.finite()?,
                 "up" => fog.up = self.vector()?.normalize_or(DVec3::Y),
-                "turbulence" => {
-                    self.vector()?;
-                    self.warn("the turbulence of fog is not rendered");
-                }
-                "turb_depth" | "octaves" | "omega" | "lambda" => {
-                    self.float()?;
-                }
+                "turbulence" => turbulence = self.vector()?,
+                "turb_depth" => turbulent_depth = self.finite()?,
+                "octaves" => fog.octaves.0.octaves = self.whole(1.0, 10.0)?,
+                // In single precision, as POV-Ray keeps them.
+                "omega" => fog.octaves.0.omega = f64::from(self.finite()? as f32),
+                "lambda" => fog.octaves.0.lambda = f64::from(self.finite()? as f32),
                 _ => match self.known(&word)? {
                     Some(Value::Fog(known)) => {
                         fog = (*known).clone();
+                        if let Some((amount, scale)) = fog.turbulence {
+                            (turbulent_depth, turbulence) = (amount, scale);
+                        }
                         if let Some([o, a]) = fog.ground {
                             (is_ground, offset, altitude) = (true, o, a);
                         }
@@ -190,6 +230,7 @@ impl Parser<'_, '_> {
             }
         }
         fog.ground = is_ground.then_some([offset, altitude]);
+        fog.turbulence = (turbulence != DVec3::ZERO).then_some((turbulent_depth, turbulence));
         Ok(fog)
     }
 

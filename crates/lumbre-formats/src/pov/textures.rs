@@ -16,6 +16,9 @@ use super::patterns::Draft;
 use super::value::Value;
 use super::{Parser, Result};
 
+/// How strong the pattern of a normal is that does not say so.
+const DEFAULT_BUMPS: f64 = 0.5;
+
 pub(super) type FinishStatement = Finish;
 pub(super) type InteriorStatement = Interior;
 
@@ -67,17 +70,10 @@ impl Parser<'_, '_> {
                         _ => self.defaults.texture = Some(texture),
                     }
                 }
-                "pigment" => {
-                    self.expect(b'{')?;
-                    self.defaults.layer.pigment = self.pigment_body(None, b'}')?;
-                }
-                "normal" => {
-                    self.expect(b'{')?;
-                    self.defaults.layer.normal = Some(self.normal_body(None, b'}')?);
-                }
-                "finish" => {
-                    let base = (*self.defaults.layer.finish).clone();
-                    self.defaults.layer.finish = Arc::new(self.finish_block(base)?);
+                "pigment" | "normal" | "finish" => {
+                    let mut layer = self.defaults.layer.clone();
+                    self.layer_part(&word, &mut layer)?;
+                    self.defaults.layer = layer;
                 }
                 "camera" => {
                     let camera = self.camera_block(self.default_camera.clone())?;
@@ -99,6 +95,8 @@ impl Parser<'_, '_> {
         let mut kind = PigmentKind::Colour(Colour::default());
         let mut map: Option<Rc<Map>> = None;
         let mut blocks: Vec<Arc<Pigment>> = Vec::new();
+        // Whether the first block is a pigment: then those that are not given are black, else they have colours.
+        let mut is_of_pigments = false;
         let mut is_average = false;
         if let Some(base) = base {
             (draft, kind) = opened(&base);
@@ -120,7 +118,10 @@ impl Parser<'_, '_> {
                 let colour = self.colour()?.as_colour();
                 match &draft.pattern {
                     Some(pattern) if pattern.is_block() => blocks.push(Arc::new(Pigment::plain(colour))),
-                    _ => kind = PigmentKind::Colour(colour),
+                    _ => {
+                        draft.pattern = None;
+                        kind = PigmentKind::Colour(colour);
+                    }
                 }
                 continue;
             }
@@ -141,6 +142,7 @@ impl Parser<'_, '_> {
                 "pigment" => {
                     self.peeked = None;
                     self.expect(b'{')?;
+                    is_of_pigments |= blocks.is_empty();
                     blocks.push(self.pigment_body(None, b'}')?);
                 }
                 "average" => {
@@ -150,6 +152,7 @@ impl Parser<'_, '_> {
                 "image_map" => {
                     self.peeked = None;
                     self.expect(b'{')?;
+                    draft.pattern = None;
                     kind = PigmentKind::Image(Box::new(self.image_body()?));
                 }
                 "quick_color" | "quick_colour" => {
@@ -203,6 +206,10 @@ impl Parser<'_, '_> {
                     }
                 }
             }
+        }
+        if is_of_pigments && let Some(count) = draft.pattern.as_ref().and_then(Pattern::block_count) {
+            let black = Arc::new(Pigment::plain(Colour::default()));
+            blocks.resize(count.max(blocks.len()), black);
         }
         let kind = self.pigment_kind(&mut draft, kind, map, blocks, is_average)?;
         Ok(Arc::new(Pigment { kind, warps: draft.warps, uv: draft.uv }))
@@ -260,12 +267,16 @@ impl Parser<'_, '_> {
     /// A normal up to a closing mark.
     pub(super) fn normal_body(&mut self, base: Option<Arc<Normal>>, end: u8) -> Result<Arc<Normal>> {
         let mut draft = Draft::new(None, Warps::default(), false);
-        let mut amount = 0.5;
+        let mut amount = DEFAULT_BUMPS;
         let mut accuracy = 0.02;
         let mut no_bump_scale = false;
         let mut special: Option<Rc<str>> = None;
         let mut map: Option<Rc<Map>> = None;
         let mut kept: Option<Arc<Normal>> = base;
+        if let Some(base) = &kept {
+            draft.warps = base.warps.clone();
+            amount = base.amount;
+        }
         let mut is_average = false;
         let mut is_ignored = false;
         let mut blocks: Vec<Arc<Normal>> = Vec::new();
@@ -296,6 +307,7 @@ impl Parser<'_, '_> {
             if let Some(found) = self.pattern_kind(&word)? {
                 draft.begin(found, self.settings.generator);
                 special = Some(word);
+                amount = DEFAULT_BUMPS;
                 continue;
             }
             if self.pattern_modifier(&word, &mut draft)? {
@@ -326,6 +338,7 @@ impl Parser<'_, '_> {
                     }
                     while matches!(self.peek()?, Some(Kind::Text(_) | Kind::Number(_)))
                         || matches!(self.word()?.as_deref(), Some("coords" | "size" | "interpolate" | "df3"))
+                        || self.is_mark(b',')?
                     {
                         self.next()?;
                     }
@@ -357,21 +370,19 @@ impl Parser<'_, '_> {
             }
         } else if let Some(pattern) = draft.pattern {
             normal_kind(pattern, special.as_deref(), map.as_deref(), blocks)
-        } else if let Some(known) = &kept {
+        } else if let Some(known) = kept.as_ref().filter(|_| !is_ignored) {
             accuracy = known.accuracy;
             no_bump_scale |= known.no_bump_scale;
-            known.kind.clone()
-        } else {
-            // What modifies a pattern without naming one modifies that of the normal that is the default.
-            match self.defaults.layer.normal.as_ref().map(|normal| &normal.kind) {
-                Some(NormalKind::Slope { pattern, .. }) if !is_ignored => {
+            match &known.kind {
+                NormalKind::Slope { pattern, .. } if map.is_some() => {
                     normal_kind((**pattern).clone(), None, map.as_deref(), blocks)
                 }
-                _ if !is_ignored && map.is_some() => {
-                    return Err(self.error("a normal without a pattern"));
-                }
-                _ => NormalKind::Average(Arc::from([])),
+                kind => kind.clone(),
             }
+        } else if map.is_some() && !is_ignored {
+            return Err(self.error("a normal without a pattern"));
+        } else {
+            NormalKind::Average(Arc::from([]))
         };
         Ok(Arc::new(Normal { kind, warps: draft.warps, amount, accuracy, no_bump_scale, uv: draft.uv }))
     }
@@ -570,21 +581,18 @@ impl Parser<'_, '_> {
         }
     }
 
-    /// The pigment, the normal or the finish of a layer, whose word was taken.
+    /// The pigment, the normal or the finish of a layer, whose word was taken: what it says changes what is there.
     pub(super) fn layer_part(&mut self, word: &str, layer: &mut Layer) -> Result<()> {
         match word {
             "pigment" => {
                 self.expect(b'{')?;
-                layer.pigment = self.pigment_body(None, b'}')?;
+                layer.pigment = self.pigment_body(Some(Arc::clone(&layer.pigment)), b'}')?;
             }
             "normal" => {
                 self.expect(b'{')?;
-                layer.normal = Some(self.normal_body(None, b'}')?);
+                layer.normal = Some(self.normal_body(layer.normal.clone(), b'}')?);
             }
-            _ => {
-                let base = (*self.defaults.layer.finish).clone();
-                layer.finish = Arc::new(self.finish_block(base)?);
-            }
+            _ => layer.finish = Arc::new(self.finish_block((*layer.finish).clone())?),
         }
         Ok(())
     }

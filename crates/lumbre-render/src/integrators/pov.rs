@@ -7,7 +7,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec2, DVec3, Elementary};
-use lumbre_scene::pov::{PovArea, PovLight, PovWorld};
+use lumbre_scene::pov::{PovArea, PovLight, PovRadiosity, PovWorld};
 use lumbre_scene::{Footprint, Interaction, Light, Scene, View};
 use lumbre_shading::pov::{Eye, Finish, LayerAt, PovMaterial};
 use lumbre_shading::{MaterialKind, Spectrum};
@@ -28,6 +28,12 @@ const NEAR: f64 = 1e-4;
 /// Light that grazes a surface by less than this cosine does not reach it.
 const GRAZING: f64 = 1e-10;
 
+/// From how many directions light is gathered by radiosity, where the camera sees a surface …
+const MIN_GATHERED: u32 = 64;
+const MAX_GATHERED: u32 = 256;
+/// … and where that light comes from.
+const GATHERED_FURTHER: u32 = 4;
+
 /// The exponent of the cosine by which `caustics 1` gathers light.
 const CAUSTICS: f32 = 45.0;
 
@@ -39,10 +45,17 @@ struct Traced<'s> {
     ray: Ray,
     inside: Inside<'s>,
     level: u32,
+    /// Whether it goes on where another passed a surface straight: such a ray has the level of that other, and is not
+    /// followed at the last level.
+    is_straight: bool,
     /// The most that it can add to the picture.
     weight: f32,
     is_mirrored: bool,
     is_camera: bool,
+    /// How many surfaces have gathered light by radiosity on its way.
+    gathers: u32,
+    /// By how much the directions are shifted from which light is gathered.
+    shift: DVec2,
 }
 
 /// What all rays of a picture need.
@@ -58,7 +71,7 @@ impl RayIntegrator for Pov {
         scene: &Scene,
         _: &View,
         primary_hit: PrimaryHit<'_>,
-        _: &SampleNumbers,
+        numbers: &SampleNumbers,
         record: &mut Record,
     ) -> Spectrum {
         let Some(world) = scene.pov() else { return Spectrum::BLACK };
@@ -77,9 +90,12 @@ impl RayIntegrator for Pov {
             },
             ray,
             level: 0,
+            is_straight: false,
             weight: 1.0,
             is_mirrored: false,
             is_camera: true,
+            gathers: 0,
+            shift: numbers.light_point(0),
         };
         let colour = tracer.trace(&first, record);
         if world.gamma == 1.0 { colour } else { colour.map(|c| c.max(0.0).power(world.gamma)) }
@@ -105,7 +121,7 @@ impl<'s> Tracer<'s> {
             let is_hidden =
                 (visible.no_image && traced.is_camera) || (visible.no_reflection && traced.is_mirrored);
             let distance = (here.surface.point - traced.ray.origin).length();
-            if !is_hidden && distance >= NEAR * f64::from(u8::from(!traced.is_camera)) {
+            if !is_hidden && distance >= NEAR {
                 return Some((here, material, distance));
             }
             ray = here.leave(ray.direction);
@@ -114,7 +130,9 @@ impl<'s> Tracer<'s> {
     }
 
     fn trace(&self, traced: &Traced<'s>, record: &mut Record) -> Spectrum {
-        if traced.level >= self.world.max_trace_level || traced.weight < self.world.adc_bailout {
+        if traced.level + u32::from(traced.is_straight) >= self.world.max_trace_level
+            || traced.weight < self.world.adc_bailout
+        {
             return Spectrum::BLACK;
         }
         let direction = traced.ray.direction.normalize();
@@ -127,21 +145,13 @@ impl<'s> Tracer<'s> {
                 let left = traced.inside.iter().fold(Spectrum::WHITE, fade);
                 (self.shade(traced, &here, material, left, record), distance)
             }
-            None => (self.sky(direction), f64::INFINITY),
+            None => (self.world.sky_colour(direction), f64::INFINITY),
         };
         if traced.inside.iter().any(|solid| !solid.hollow) {
             return colour;
         }
         let colour = self.through_media(traced, direction, length, colour, record);
         self.in_fog(colour, traced.ray.origin, direction, length)
-    }
-
-    fn sky(&self, direction: DVec3) -> Spectrum {
-        let eye = Eye { normal: -direction, direction: -direction, uv: DVec2::ZERO };
-        self.world.sky.iter().fold(self.world.background, |below, pigment| {
-            let colour = pigment.colour(direction, &eye);
-            colour.rgb * colour.opacity(false) + below * colour.passing()
-        })
     }
 
     /// Light through all fogs: what each leaves is multiplied, and what each adds is added.
@@ -181,8 +191,8 @@ impl<'s> Tracer<'s> {
         sum
     }
 
-    /// The light of layers, the bottom first, with what is left of it on the way from there. Mirrors are not dimmed by
-    /// that.
+    /// The light of layers, the bottom first. What the solids that a ray is in leave of light dims what passes the
+    /// layers, and neither their own light nor mirrors.
     #[allow(clippy::too_many_arguments, reason = "layers are seen by a ray, from inside or outside")]
     fn stack(
         &self,
@@ -195,13 +205,24 @@ impl<'s> Tracer<'s> {
         record: &mut Record,
     ) -> Spectrum {
         let mut sum = Spectrum::BLACK;
-        let mut left = fade;
+        let mut left = Spectrum::WHITE;
         // What the lights give is the same for layers of the same normal.
         let mut shadows: Vec<Option<Spectrum>> = vec![None; self.lights.len()];
+        let mut gathered = None;
+        let has_ambient = self.world.radiosity.is_none_or(|radiosity| radiosity.has_ambient);
         for layer in layers.iter().rev() {
             let (colour, finish) = (layer.colour, layer.finish);
             let opacity = material.opacity(colour);
-            let own = finish.emission + finish.ambient * self.world.ambient_light;
+            let mut own = finish.emission;
+            if has_ambient {
+                own += finish.ambient * self.world.ambient_light;
+            }
+            if let Some(radiosity) = &self.world.radiosity
+                && finish.diffuse * opacity != 0.0
+            {
+                own += *gathered.get_or_insert_with(|| self.gathered(traced, here, radiosity, record))
+                    * finish.diffuse;
+            }
             sum += left * colour.rgb * own * opacity;
             for (light, shadow) in self.lights.iter().zip(&mut shadows) {
                 sum += left * self.lit(traced, here, material, layer, light, opacity, shadow, record);
@@ -214,11 +235,61 @@ impl<'s> Tracer<'s> {
             }
         }
         if let Some(top) = layers.last()
-            && gray(left) >= self.world.adc_bailout
+            && gray((left * fade).map(f32::abs)) >= self.world.adc_bailout
         {
-            sum += self.passing(traced, here, material, top, [left, fade], is_inside, record);
+            sum += self.passing(traced, here, material, top, [left * fade, fade], is_inside, record);
         }
         sum
+    }
+
+    /// The mean of the light that comes to a surface from all directions, by the cosine of each.
+    fn gathered(
+        &self,
+        traced: &Traced<'s>,
+        here: &Interaction<'s>,
+        radiosity: &PovRadiosity,
+        record: &mut Record,
+    ) -> Spectrum {
+        if traced.gathers >= radiosity.bounces {
+            return Spectrum::BLACK;
+        }
+        let count = match traced.gathers {
+            0 => radiosity.count.clamp(MIN_GATHERED, MAX_GATHERED),
+            _ => GATHERED_FURTHER,
+        };
+        let d = traced.ray.direction;
+        let smooth = here.shading.normal.as_dvec3();
+        let normal = if smooth.dot(d) > 0.0 { -smooth } else { smooth };
+        let raw = if here.surface.normal.dot(d) > 0.0 { -here.surface.normal } else { here.surface.normal };
+        let (side, up) = normal.any_orthonormal_pair();
+        let mut sum = Spectrum::BLACK;
+        for i in 0..count {
+            // The sequence R2 of Martin Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
+            let u = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_2) * (f64::from(i) + 0.5);
+            let u = u + traced.shift;
+            let u = u - u.floor();
+            let (sine, cosine) = (std::f64::consts::TAU * u.y).sine_cosine();
+            let across = u.x.sqrt();
+            let direction = side * (across * cosine) + up * (across * sine) + normal * (1.0 - u.x).sqrt();
+            if direction.dot(raw) <= 0.0 {
+                continue;
+            }
+            let next = Traced {
+                ray: here.leave(direction.normalize()),
+                inside: traced.inside.clone(),
+                level: 0,
+                is_straight: false,
+                weight: 1.0,
+                is_mirrored: false,
+                is_camera: false,
+                gathers: traced.gathers + 1,
+                shift: u,
+            };
+            record.counts.bounce += 1;
+            sum += self.trace(&next, record);
+        }
+        let mean = sum * (radiosity.brightness / count as f32);
+        mean * (1.0 - radiosity.grayness) + Spectrum::splat(gray(mean) * radiosity.grayness)
     }
 
     /// Diffuse light and highlights of a light on a layer.
@@ -249,23 +320,23 @@ impl<'s> Tracer<'s> {
         if !lights_it || !needs_light {
             return Spectrum::BLACK;
         }
-        if let Some(area) = &light.area
-            && area.illumination
-        {
-            let [n, m] = area.counts;
-            let mut sum = Spectrum::BLACK;
-            for i in 0..n * m {
-                let from = light.place(DVec2::new(step(i / m, n), step(i % m, m)), p);
-                let arriving = light.arriving(p, from);
-                let shaded = self.shaded(traced, here, material, layer, light, from, arriving, opacity);
-                if !shaded.is_black() {
-                    sum += shaded * self.shadow(here, light, from, record);
+        // Of all points of an area or of its middle; what comes through is a factor of its own, as POV-Ray has it.
+        let shaded = match &light.area {
+            Some(area) if area.illumination => {
+                let [n, m] = area.counts;
+                let mut sum = Spectrum::BLACK;
+                for i in 0..n * m {
+                    let from = light.place(DVec2::new(step(i / m, n), step(i % m, m)), p);
+                    let arriving = light.arriving(p, from);
+                    sum += self.shaded(traced, here, material, layer, light, from, arriving, opacity);
                 }
+                sum * ((n * m) as f32).recip()
             }
-            return sum * ((n * m) as f32).recip();
-        }
-        let arriving = light.arriving(p, light.from);
-        let shaded = self.shaded(traced, here, material, layer, light, light.from, arriving, opacity);
+            _ => {
+                let arriving = light.arriving(p, light.from);
+                self.shaded(traced, here, material, layer, light, light.from, arriving, opacity)
+            }
+        };
         if shaded.is_black() || light.shadowless {
             return shaded;
         }
@@ -350,7 +421,7 @@ impl<'s> Tracer<'s> {
         let [amount, thickness, turbulence] = finish.irid;
         let mut thickness = f64::from(thickness);
         if turbulence != 0.0 {
-            let noise = lumbre_shading::pov::Octaves::default()
+            let noise = lumbre_shading::pov::Octaves { octaves: 5, ..Default::default() }
                 .turbulence(p, lumbre_shading::pov::NoiseGenerator::Corrected);
             thickness *= 1.0 + f64::from(turbulence) * (2.0 * noise - 1.0);
         }
@@ -398,9 +469,12 @@ impl<'s> Tracer<'s> {
             ray: here.leave(direction.normalize()),
             inside: traced.inside.clone(),
             level: traced.level + 1,
+            is_straight: false,
             weight,
             is_mirrored: true,
             is_camera: false,
+            gathers: traced.gathers,
+            shift: traced.shift,
         };
         record.counts.bounce += 1;
         let seen = self.trace(&next, record);
@@ -452,9 +526,13 @@ impl<'s> Tracer<'s> {
             ray: here.leave(direction.normalize()),
             inside,
             level: if is_straight { traced.level } else { traced.level + 1 },
-            weight: traced.weight * gray(left),
+            is_straight,
+            // A transparency below 0 shows what is behind in negative.
+            weight: traced.weight * gray(left.map(f32::abs)),
             is_mirrored: traced.is_mirrored || is_total,
             is_camera: traced.is_camera,
+            gathers: traced.gathers,
+            shift: traced.shift,
         };
         record.counts.bounce += 1;
         let seen = self.trace_straight(next, is_straight, record);
@@ -533,16 +611,21 @@ impl<'s> Tracer<'s> {
                     direction: -towards,
                     uv: material.surface_uv(there.surface.point, there.at.uv.as_dvec2()),
                 };
-                let is_inside = inside.iter().any(|solid| solid.is_of_solid(material));
+                // A ray that begins at a surface may begin inside of a solid.
+                let is_inside = !there.front || inside.iter().any(|solid| solid.is_of_solid(material));
                 let mut passes = Spectrum::BLACK;
-                for (share, layers) in &material.stacks(there.surface.point, &eye, !is_inside) {
-                    passes += layers
+                for (share, layers) in &material.stacks(there.surface.point, &eye, there.front) {
+                    let mut stack = layers
                         .iter()
                         .fold(Spectrum::splat(*share), |left, layer| left * layer.colour.passing());
-                }
-                if material.interior.caustics != 0.0 {
-                    let focus = CAUSTICS * material.interior.caustics;
-                    passes *= 1.0 + (normal.dot(towards).abs() as f32).power(focus);
+                    if material.interior.caustics != 0.0
+                        && let Some(top) = layers.last()
+                    {
+                        // Light gathers behind bumps, too.
+                        let focus = CAUSTICS * material.interior.caustics;
+                        stack *= 1.0 + (top.normal.dot(towards).abs() as f32).power(focus);
+                    }
+                    passes += stack;
                 }
                 left *= passes;
                 if is_inside {

@@ -101,42 +101,75 @@ pub(super) fn triangular(p: DVec3) -> f64 {
 /// The distances to the nearest of random points, one in each cube.
 pub(super) fn crackle(p: DVec3, crackle: &Crackle, generator: NoiseGenerator) -> f64 {
     let base = (p - DVec3::splat(TINY)).floor();
+    let place = p - base;
+    let offset = power(crackle.offset.abs(), crackle.metric);
+    // How many of the nearest are asked for.
+    let asked = match crackle.form {
+        _ if crackle.is_solid => 1,
+        form if form.z != 0.0 => 3,
+        form if form.y != 0.0 => 2,
+        _ => 1,
+    };
     let mut nearest = [f64::INFINITY; 3];
     let mut nucleus = DVec3::ZERO;
-    for x in -2_i32..=2 {
-        for y in -2_i32..=2 {
-            for z in -2_i32..=2 {
-                if [x, y, z].iter().filter(|d| d.abs() == 2).count() >= 2 {
-                    continue;
-                }
-                let cell = base + DVec3::new(f64::from(x), f64::from(y), f64::from(z));
-                let seed = hash3(cell.x as i64, cell.y as i64, cell.z as i64);
-                let point = cell + DVec3::new(random(seed), random(seed + 1), random(seed + 2));
-                let distance = measure(point - p, crackle);
-                if distance < nearest[0] {
-                    nearest = [distance, nearest[0], nearest[1]];
-                    nucleus = point;
-                } else if distance < nearest[1] {
-                    nearest = [nearest[0], distance, nearest[1]];
-                } else if distance < nearest[2] {
-                    nearest[2] = distance;
-                }
-            }
+    for [x, y, z] in NEAR_CUBES {
+        let corner = DVec3::new(f64::from(x), f64::from(y), f64::from(z));
+        // No point of the cube is nearer than its surface.
+        let least = place - place.clamp(corner, corner + DVec3::ONE);
+        if crackle.metric > 0.0 && measure(least, crackle.metric) + offset >= nearest[asked - 1] {
+            continue;
+        }
+        let cell = base + corner;
+        let seed = hash3(cell.x as i64, cell.y as i64, cell.z as i64);
+        let point = cell + DVec3::new(random(seed), random(seed + 1), random(seed + 2));
+        let distance = measure(point - p, crackle.metric) + offset;
+        if distance < nearest[0] {
+            nearest = [distance, nearest[0], nearest[1]];
+            nucleus = point;
+        } else if distance < nearest[1] {
+            nearest = [nearest[0], distance, nearest[1]];
+        } else if distance < nearest[2] {
+            nearest[2] = distance;
         }
     }
     if crackle.is_solid {
         return noise(nucleus, generator);
     }
     let root = |sum: f64| if crackle.metric == 2.0 { sum.sqrt() } else { sum.power(1.0 / crackle.metric) };
-    let distances = DVec3::from_array(nearest.map(root));
-    crackle.form.dot(distances).clamp(0.0, 1.0)
+    (0..asked).map(|i| crackle.form[i] * root(nearest[i])).sum::<f64>().clamp(0.0, 1.0)
+}
+
+/// The cubes about one, the nearest first: 5³ without those that are two away along several axes.
+const NEAR_CUBES: [[i32; 3]; 81] = near_cubes();
+
+const fn near_cubes() -> [[i32; 3]; 81] {
+    let mut cubes = [[0; 3]; 81];
+    let (mut count, mut away) = (0, 0);
+    while away <= 6 {
+        let mut i = 0;
+        while i < 125 {
+            let [x, y, z] = [i / 25 - 2, i / 5 % 5 - 2, i % 5 - 2];
+            let far = (x * x == 4) as i32 + (y * y == 4) as i32 + (z * z == 4) as i32;
+            if far < 2 && x * x + y * y + z * z == away {
+                cubes[count] = [x, y, z];
+                count += 1;
+            }
+            i += 1;
+        }
+        away += 1;
+    }
+    cubes
+}
+
+/// The power of a number that is not negative: whole exponents, as metrics have, are multiplied.
+fn power(x: f64, exponent: f64) -> f64 {
+    if exponent == exponent.trunc() && (1.0..=16.0).contains(&exponent) {
+        return (1..exponent as u32).fold(x, |product, _| product * x);
+    }
+    x.power(exponent)
 }
 
 /// The distance in a metric, before the root.
-fn measure(v: DVec3, crackle: &Crackle) -> f64 {
-    if crackle.metric == 2.0 {
-        return v.length_squared() + crackle.offset * crackle.offset;
-    }
-    let power = |x: f64| x.abs().power(crackle.metric);
-    power(v.x) + power(v.y) + power(v.z) + power(crackle.offset)
+fn measure(v: DVec3, metric: f64) -> f64 {
+    power(v.x.abs(), metric) + power(v.y.abs(), metric) + power(v.z.abs(), metric)
 }

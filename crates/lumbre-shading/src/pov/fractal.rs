@@ -106,7 +106,8 @@ impl Fractal {
             3 => z.y * factor,
             4 => z.x * z.x * factor,
             5 => z.y * z.y * factor,
-            _ => z.length() * factor,
+            // As POV-Ray has it: the factor is on one square alone.
+            _ => z.x * z.x + z.y * z.y * factor,
         }
     }
 }
@@ -123,7 +124,8 @@ fn outside((kind, factor): (u32, f64), iteration: u32, iterations: u32, z: DVec2
         6 => z.length() * factor,
         _ => {
             let factor = if factor == 0.0 { 1.0 } else { factor };
-            (count % factor) / factor
+            let period = if kind == 8 { factor + 1.0 } else { factor };
+            (count % period) / factor
         }
     }
 }

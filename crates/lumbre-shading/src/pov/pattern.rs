@@ -227,9 +227,9 @@ impl Pattern {
         p + self.turbulence * self.octaves.vector_turbulence(p)
     }
 
-    /// Whether turbulence is in its formula alone. Spirals have it there, too, at points that it has moved.
+    /// Whether turbulence is in its formula alone. Spirals and agate have it there, too, at points that it has moved.
     fn has_own_turbulence(&self) -> bool {
-        matches!(self.kind, PatternKind::Marble | PatternKind::Wood | PatternKind::Agate(_))
+        matches!(self.kind, PatternKind::Marble | PatternKind::Wood)
     }
 
     /// Whether its values are whole numbers that name one of several.

@@ -150,7 +150,9 @@ impl Lobes {
             let exponent = 1.0 / finish.roughness.max(1e-6);
             let specular = if finish.specular_albedo { 1.0 } else { 8.0 / (exponent + 8.0) };
             highlight(finish.specular, exponent, finish.specular * specular);
-            self.mirror += linear(finish.reflection.at(1.0, material.interior.ior)) * share;
+            // Head on, mirrors of metal have the whole tint.
+            let metal = Spectrum::WHITE + (tint - Spectrum::WHITE) * finish.reflection.metallic;
+            self.mirror += linear(finish.reflection.at(1.0, material.interior.ior)) * metal * share;
             left = left * linear(colour.rgb) * colour.filter + left * colour.transmit;
         }
         self.passed += left;

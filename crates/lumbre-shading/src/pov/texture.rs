@@ -193,7 +193,7 @@ impl Interior {
 
     /// What is left of light after a distance inside.
     pub fn transmittance(&self, distance: f32) -> Spectrum {
-        if self.fade_power <= 0.0 || self.fade_distance <= 0.0 || !distance.is_finite() {
+        if self.fade_distance <= 0.0 || !distance.is_finite() {
             return Spectrum::WHITE;
         }
         let depth = distance / self.fade_distance;
