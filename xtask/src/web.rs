@@ -68,9 +68,6 @@ fn missing() -> Result<Vec<String>> {
     if matches!(Compiler::find(), Some(Compiler::Debian)) && !succeeds("wasm-ld", &["--version"]) {
         missing.push("wasm-ld (Debian: apt-get install lld)".to_owned());
     }
-    if !succeeds("wasm-opt", &["--version"]) {
-        missing.push("wasm-opt (Debian: apt-get install binaryen)".to_owned());
-    }
     let version = bindgen_version()?;
     if bindgen(&version).is_none() {
         missing.push(format!("wasm-bindgen {version} (cargo install wasm-bindgen-cli --version {version})"));
@@ -178,26 +175,11 @@ fn build() -> Result<()> {
         &compiled,
     ];
     run(&bindgen, &module)?;
-    shrink(&format!("{generated}/lumbre_web_bg.wasm"))?;
     let install = ["ci", "--prefix", FOLDER, "--ignore-scripts", "--no-audit", "--no-fund"];
     run("npm", &install)?;
     run("npm", &["run", "--prefix", FOLDER, "check"])?;
     let out = out();
     run("node", &[&format!("{FOLDER}/build.mjs"), &out.to_string_lossy()])
-}
-
-/// Makes a module smaller; its numbers stay what they are.
-fn shrink(module: &str) -> Result<()> {
-    let known = [
-        "--enable-simd",
-        "--enable-bulk-memory",
-        "--enable-mutable-globals",
-        "--enable-sign-ext",
-        "--enable-nontrapping-float-to-int",
-        "--enable-reference-types",
-        "--enable-multivalue",
-    ];
-    run("wasm-opt", &[&known[..], &["-Oz", module, "-o", module]].concat())
 }
 
 /// Where the package and the playground lie.
