@@ -16,6 +16,8 @@ use table::Table;
 
 use crate::book;
 
+/// The status of a program that does not have what is asked: EX_UNAVAILABLE of sysexits.h.
+const UNAVAILABLE: i32 = 69;
 /// The page that has the table.
 const PAGE: &str = "docs/promises.md";
 
@@ -24,7 +26,8 @@ const PAGE: &str = "docs/promises.md";
 #[derive(Args)]
 pub(crate) struct Bytes {
     /// Another program, and what runs it: "aarch64=qemu-aarch64 -L /usr/aarch64-linux-gnu lumbre". It is run at the
-    /// root of the workspace, with relative names. Words are parted by blanks.
+    /// root of the workspace, with relative names. Words are parted by blanks. Where it ends with status 69 it does not
+    /// have what is asked, and its cell stays empty.
     #[arg(long, value_name = "NAME=COMMAND")]
     with: Vec<String>,
     /// Keep the table in docs/promises.md. Else what comes out is compared with the one that is there.
@@ -81,8 +84,9 @@ impl Program {
         Ok(Self { name: name.to_owned(), command, instruction_set: None })
     }
 
-    /// What it writes: to standard output, and to the files that the arguments name in [`FOLDER`].
-    fn written(&self, run: &Run) -> Result<Vec<u8>> {
+    /// What it writes: to standard output, and to the files that the arguments name in [`FOLDER`]. None where it does not
+    /// have what is asked.
+    fn written(&self, run: &Run) -> Result<Option<Vec<u8>>> {
         let files: Vec<_> = run.outputs.iter().map(|name| root().join(FOLDER).join(name)).collect();
         for file in &files {
             if file.exists() {
@@ -95,11 +99,14 @@ impl Program {
             command.env("LUMBRE_SIMD", set);
         }
         let out = command.output().with_context(|| format!("cannot start {}", self.name))?;
+        if out.status.code() == Some(UNAVAILABLE) {
+            return Ok(None);
+        }
         let mut written = out.stdout;
         if !out.status.success() {
             if run.may_be_refused {
                 written.extend(out.stderr);
-                return Ok(written);
+                return Ok(Some(written));
             }
             let said = String::from_utf8_lossy(&out.stderr);
             bail!("{}: lumbre {}: {}", self.name, run.arguments.join(" "), said.trim_end());
@@ -110,7 +117,17 @@ impl Program {
         if written.is_empty() {
             bail!("{}: lumbre {}: nothing was written", self.name, run.arguments.join(" "));
         }
-        Ok(written)
+        Ok(Some(written))
+    }
+
+    /// The hash of what it writes in these runs.
+    fn hash<'a>(&self, runs: impl IntoIterator<Item = &'a Run>) -> Result<Option<blake3::Hash>> {
+        let mut hasher = blake3::Hasher::new();
+        for run in runs {
+            let Some(written) = self.written(run)? else { return Ok(None) };
+            hasher.update(&written);
+        }
+        Ok(Some(hasher.finalize()))
     }
 }
 
@@ -127,22 +144,27 @@ impl Table {
         for program in programs {
             eprintln!("{}", program.name);
             for (row, runs) in &runs.alone {
-                let mut hasher = blake3::Hasher::new();
-                for run in runs {
-                    hasher.update(&program.written(run)?);
-                }
-                table.put(row, hasher.finalize());
+                table.put(row, program.hash(runs)?);
             }
         }
-        for (i, program) in programs.iter().enumerate() {
-            programs[(i + 1) % programs.len()].written(&runs.begun)?;
-            table.put(runs::RESUMED, blake3::hash(&program.written(&runs.resumed)?));
+        let has_parts = |program: &Program| Ok(program.written(&runs.begun)?.is_some());
+        let sharing = programs.iter().map(has_parts).collect::<Result<Vec<bool>>>()?;
+        let able: Vec<&Program> =
+            programs.iter().zip(&sharing).filter_map(|(p, &able)| able.then_some(p)).collect();
+        let mut resumed = Vec::new();
+        for (i, program) in able.iter().enumerate() {
+            able[(i + 1) % able.len()].written(&runs.begun)?;
+            resumed.push(program.hash([&runs.resumed])?);
         }
         for (i, part) in runs.parts.iter().enumerate() {
-            programs[i % programs.len()].written(part)?;
+            able[i % able.len()].written(part)?;
         }
-        for program in programs {
-            table.put(runs::MERGED, blake3::hash(&program.written(&runs.merged)?));
+        let merged = able.iter().map(|program| program.hash([&runs.merged])).collect::<Result<Vec<_>>>()?;
+        for (row, hashes) in [(runs::RESUMED, resumed), (runs::MERGED, merged)] {
+            let mut hashes = hashes.into_iter();
+            for &is_able in &sharing {
+                table.put(row, if is_able { hashes.next().flatten() } else { None });
+            }
         }
         Ok(table)
     }

@@ -1,4 +1,4 @@
-//! What is handed out: the program for each platform, wheels, a Debian package and the book, with the licences of what they are made of,
+//! What is handed out: the program for each platform, wheels, a Debian package, one of npm and the book, with the licences of what they are made of,
 //! a list of it, and sums.
 
 use std::fs;
@@ -10,7 +10,7 @@ use clap::builder::PossibleValuesParser;
 use xtask::command::{self, root};
 
 use crate::book::Book;
-use crate::files;
+use crate::{files, web};
 
 use notices::Dependencies;
 use target::TARGETS;
@@ -48,6 +48,8 @@ enum Artefact {
     Wheel(&'static Target),
     /// The program as a package of Debian.
     Deb,
+    /// The package for Node.js and pages.
+    Npm,
     /// The book as static pages.
     Book,
 }
@@ -56,7 +58,7 @@ impl Artefact {
     fn all() -> impl Iterator<Item = Self> {
         let wheels = TARGETS.iter().filter(|target| target.has_wheel);
         let programs = TARGETS.iter().map(Self::Program);
-        programs.chain(wheels.map(Self::Wheel)).chain([Self::Deb, Self::Book])
+        programs.chain(wheels.map(Self::Wheel)).chain([Self::Deb, Self::Npm, Self::Book])
     }
 
     fn name(self) -> String {
@@ -64,6 +66,7 @@ impl Artefact {
             Self::Program(target) => format!("program-{}", target.name),
             Self::Wheel(target) => format!("wheel-{}", target.name),
             Self::Deb => "deb".to_owned(),
+            Self::Npm => "npm".to_owned(),
             Self::Book => "book".to_owned(),
         }
     }
@@ -163,6 +166,7 @@ impl Maker<'_> {
             Artefact::Program(target) => self.program(target),
             Artefact::Wheel(target) => self.wheel(target),
             Artefact::Deb => self.deb(),
+            Artefact::Npm => self.npm(),
             Artefact::Book => {
                 Book::whole().run()?;
                 let archive = self.folder.join(format!("lumbre-{VERSION}-book.zip"));
@@ -225,6 +229,18 @@ impl Maker<'_> {
         let place = self.folder.join(wheel.file_name().context("a wheel has a name")?);
         fs::copy(wheel, &place)?;
         Ok(Outcome::Made(place))
+    }
+
+    fn npm(&self) -> Result<Outcome> {
+        let package = match web::package()? {
+            Ok(package) => package,
+            Err(lacks) => return Ok(Outcome::Lacks(lacks)),
+        };
+        let notices = Dependencies::on(&[web::TARGET], &["lumbre-web"])?.notices(&[])?;
+        fs::write(package.join("THIRD-PARTY.md"), notices)?;
+        let place = package.to_string_lossy();
+        command::run("npm", &["pack", &place, "--pack-destination", &self.folder.to_string_lossy()])?;
+        Ok(Outcome::Made(self.folder.join(format!("lumbre-{VERSION}.tgz"))))
     }
 
     fn deb(&self) -> Result<Outcome> {

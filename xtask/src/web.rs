@@ -9,7 +9,7 @@ use xtask::command::{self, root, run, run_with, succeeds, target};
 /// The sources of the package and the playground.
 const FOLDER: &str = "crates/lumbre-web/npm";
 /// What WebAssembly is compiled for.
-const TARGET: &str = "wasm32-unknown-unknown";
+pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 /// How it is compiled.
 const PROFILE: &str = "web";
 /// Vectors of 128 bits, which all browsers have since 2023, and a stack as large as threads of the program have.
@@ -68,9 +68,6 @@ fn missing() -> Result<Vec<String>> {
     if matches!(Compiler::find(), Some(Compiler::Debian)) && !succeeds("wasm-ld", &["--version"]) {
         missing.push("wasm-ld (Debian: apt-get install lld)".to_owned());
     }
-    if !succeeds("wasm-opt", &["--version"]) {
-        missing.push("wasm-opt (Debian: apt-get install binaryen)".to_owned());
-    }
     let version = bindgen_version()?;
     if bindgen(&version).is_none() {
         missing.push(format!("wasm-bindgen {version} (cargo install wasm-bindgen-cli --version {version})"));
@@ -109,12 +106,25 @@ pub(crate) fn make(wanted: &Web) -> Result<()> {
     if wanted.no_tests { Ok(()) } else { test(pictures.as_deref()) }
 }
 
-/// The part of the test command: types are checked where npm is; what cannot be made is named.
+/// Makes the package for Node.js and pages, and says where it lies, or what that needs.
+pub(crate) fn package() -> Result<Result<PathBuf, String>> {
+    let missing = missing()?;
+    if !missing.is_empty() {
+        return Ok(Err(format!("it needs {}", missing.join("; "))));
+    }
+    build()?;
+    Ok(Ok(out().join("npm")))
+}
+
+/// The part of the test command: the code for WebAssembly compiles where there is a compiler; what is not made and tried is named.
 pub(crate) fn check() -> Result<()> {
     let missing = missing()?;
     if missing.is_empty() && std::env::var_os("LUMBRE_WEB").is_some() {
         build()?;
         return test(None);
+    }
+    if let Some(compiler) = Compiler::find() {
+        compiler.run(&["check"])?;
     }
     let why = match missing.is_empty() {
         true => "it takes minutes: LUMBRE_WEB=1 includes it, and cargo xtask web is it alone".to_owned(),
@@ -124,24 +134,35 @@ pub(crate) fn check() -> Result<()> {
     Ok(())
 }
 
-fn build() -> Result<()> {
-    let folder = target().join("wasm");
-    let folder_text = folder.to_string_lossy().into_owned();
-    let environment = [("CARGO_TARGET_DIR", folder_text.as_str()), ("RUSTFLAGS", FLAGS)];
-    let plain = ["build", "--profile", PROFILE, "--package", "lumbre-web", "--lib", "--target", TARGET];
-    match Compiler::find() {
-        Some(Compiler::Rustup) => run_with("cargo", &plain, &environment)?,
-        _ => {
-            let own = [&plain[..], &["-Zbuild-std=std,panic_abort"]].concat();
-            // Debian has no rust-lld.
-            let linker = [("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld")];
-            let environment = [&environment[..], &DEBIAN, &linker].concat();
-            run_with("/usr/bin/cargo", &own, &environment)?;
+/// Where cargo builds for WebAssembly.
+fn folder() -> PathBuf {
+    target().join("wasm")
+}
+
+impl Compiler {
+    /// Runs cargo on the library for the browser.
+    fn run(&self, command: &[&str]) -> Result<()> {
+        let folder = folder().to_string_lossy().into_owned();
+        let environment = [("CARGO_TARGET_DIR", folder.as_str()), ("RUSTFLAGS", FLAGS)];
+        let plain = [command, &["--package", "lumbre-web", "--lib", "--target", TARGET]].concat();
+        match self {
+            Self::Rustup => run_with("cargo", &plain, &environment),
+            Self::Debian => {
+                let own = [&plain[..], &["-Zbuild-std=std,panic_abort"]].concat();
+                // Debian has no rust-lld.
+                let linker = [("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", "wasm-ld")];
+                run_with("/usr/bin/cargo", &own, &[&environment[..], &DEBIAN, &linker].concat())
+            }
         }
     }
+}
+
+fn build() -> Result<()> {
+    let compiler = Compiler::find().context("no compiler for WebAssembly")?;
+    compiler.run(&["build", "--profile", PROFILE])?;
     let generated = format!("{FOLDER}/generated");
     std::fs::create_dir_all(root().join(&generated))?;
-    let compiled = folder.join(TARGET).join(PROFILE).join("lumbre_web.wasm");
+    let compiled = folder().join(TARGET).join(PROFILE).join("lumbre_web.wasm");
     let compiled = compiled.to_string_lossy();
     let bindgen = bindgen(&bindgen_version()?).context("wasm-bindgen")?;
     let module = [
@@ -154,26 +175,11 @@ fn build() -> Result<()> {
         &compiled,
     ];
     run(&bindgen, &module)?;
-    shrink(&format!("{generated}/lumbre_web_bg.wasm"))?;
     let install = ["ci", "--prefix", FOLDER, "--ignore-scripts", "--no-audit", "--no-fund"];
     run("npm", &install)?;
     run("npm", &["run", "--prefix", FOLDER, "check"])?;
     let out = out();
     run("node", &[&format!("{FOLDER}/build.mjs"), &out.to_string_lossy()])
-}
-
-/// Makes a module smaller; its numbers stay what they are.
-fn shrink(module: &str) -> Result<()> {
-    let known = [
-        "--enable-simd",
-        "--enable-bulk-memory",
-        "--enable-mutable-globals",
-        "--enable-sign-ext",
-        "--enable-nontrapping-float-to-int",
-        "--enable-reference-types",
-        "--enable-multivalue",
-    ];
-    run("wasm-opt", &[&known[..], &["-Oz", module, "-o", module]].concat())
 }
 
 /// Where the package and the playground lie.

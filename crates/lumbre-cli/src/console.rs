@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::ffi::OsString;
+#[cfg(not(target_family = "wasm"))]
 use std::io::{IsTerminal, Write};
 
 use lumbre::formats::diagnostic::is_printable;
@@ -13,12 +14,14 @@ const WARNING: &str = "\x1b[1m\x1b[33m";
 const PLAIN: &str = "\x1b[0m";
 
 /// Whether text for this stream has colours.
+#[cfg(not(target_family = "wasm"))]
 pub(crate) fn has_colours(stream: &impl IsTerminal) -> bool {
     colours(|name| std::env::var_os(name), stream.is_terminal() && understands_ansi())
 }
 
 /// Whether the terminal takes escape sequences. Consoles of Windows do from Windows 10 on, once they are asked to; the
 /// terminals of MSYS, which are no consoles, set `TERM`.
+#[cfg(not(target_family = "wasm"))]
 pub(crate) fn understands_ansi() -> bool {
     !cfg!(windows)
         || std::env::var_os("TERM").is_some_and(|name| !name.is_empty())
@@ -41,6 +44,7 @@ fn colours(variable: impl Fn(&str) -> Option<OsString>, is_terminal: bool) -> bo
 }
 
 /// Prints a message to standard error, ignoring errors. `error:`, `warning:` and `aviso:` in front have their colour.
+#[cfg(not(target_family = "wasm"))]
 pub(crate) fn tell(message: &str) {
     let stream = std::io::stderr();
     let text = message_text(message, has_colours(&stream));

@@ -8,6 +8,8 @@ use std::sync::OnceLock;
 use crate::Real;
 #[cfg(target_arch = "aarch64")]
 use crate::neon::F32x4;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+use crate::wasm::F32x4;
 #[cfg(target_arch = "x86_64")]
 use crate::x86::OnX86;
 
@@ -29,6 +31,8 @@ enum Set {
     Scalar,
     #[cfg(target_arch = "aarch64")]
     Neon,
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    Simd128,
     #[cfg(target_arch = "x86_64")]
     Avx2,
     #[cfg(target_arch = "x86_64")]
@@ -83,7 +87,7 @@ impl InstructionSet {
     pub fn limited_to(name: &str) -> Result<Self, UnknownInstructionSet> {
         match name {
             "scalar" => Ok(Self::SCALAR),
-            "neon" => Ok(best_up_to(4)),
+            "neon" | "simd128" => Ok(best_up_to(4)),
             "avx2" => Ok(best_up_to(8)),
             "avx512" => Ok(best_up_to(16)),
             _ => Err(UnknownInstructionSet(name.to_owned())),
@@ -96,6 +100,9 @@ impl InstructionSet {
         // Every processor of this architecture has it.
         #[cfg(target_arch = "aarch64")]
         all.push(Self(Set::Neon));
+        // Where it is not there, a module that is compiled with it does not start.
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        all.push(Self(Set::Simd128));
         #[cfg(target_arch = "x86_64")]
         {
             let has_avx2 = std::arch::is_x86_feature_detected!("avx2")
@@ -119,12 +126,14 @@ impl InstructionSet {
         all
     }
 
-    /// Its name, as `LUMBRE_SIMD` takes it.
+    /// Its name, as `LUMBRE_SIMD` takes it where there is an environment: `simd128` is of WebAssembly, which has none.
     pub fn name(self) -> &'static str {
         match self.0 {
             Set::Scalar => "scalar",
             #[cfg(target_arch = "aarch64")]
             Set::Neon => "neon",
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Set::Simd128 => "simd128",
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => "avx2",
             #[cfg(target_arch = "x86_64")]
@@ -138,6 +147,8 @@ impl InstructionSet {
             Set::Scalar => 1,
             #[cfg(target_arch = "aarch64")]
             Set::Neon => 4,
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Set::Simd128 => 4,
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => 8,
             #[cfg(target_arch = "x86_64")]
@@ -152,6 +163,8 @@ impl InstructionSet {
             Set::Scalar => job.run_scalar(),
             #[cfg(target_arch = "aarch64")]
             Set::Neon => job.run_neon(),
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Set::Simd128 => job.run_simd128(),
             // SAFETY: `available` alone makes this value, after finding on this machine all the features of `run_avx2`.
             #[cfg(target_arch = "x86_64")]
             Set::Avx2 => unsafe { job.run_avx2() },
@@ -179,6 +192,12 @@ trait CompilationUnit: Job + Sized {
     #[cfg(target_arch = "aarch64")]
     #[inline(never)]
     fn run_neon(self) -> Self::Output {
+        self.run::<F32x4>()
+    }
+
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    #[inline(never)]
+    fn run_simd128(self) -> Self::Output {
         self.run::<F32x4>()
     }
 }

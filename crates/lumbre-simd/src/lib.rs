@@ -16,7 +16,11 @@
 //! sign and payload are unspecified. Comparisons with NaN are false (`simd_ne` is true), and `simd_min(a, b)` is `if a
 //! < b { a } else { b }`.
 
-#[cfg(any(target_arch = "aarch64", target_arch = "x86_64"))]
+#[cfg(any(
+    target_arch = "aarch64",
+    target_arch = "x86_64",
+    all(target_arch = "wasm32", target_feature = "simd128")
+))]
 mod indices;
 mod instruction_set;
 mod lanes;
@@ -26,6 +30,8 @@ mod neon;
 pub mod random;
 mod scalar;
 mod v3;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 

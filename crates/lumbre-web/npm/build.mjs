@@ -20,6 +20,7 @@ await writeFile(join(generated, "glue.js"), `export function glue() {\n${code}\n
 const wasm = await readFile(join(generated, "lumbre_web_bg.wasm"));
 
 const shared = {
+  absWorkingDir: here,
   bundle: true,
   minify: true,
   target: "es2022",

@@ -93,6 +93,10 @@ impl Scene {
         self.0.pixels()
     }
 
+    pub fn light(&self) -> Vec<f32> {
+        self.0.light()
+    }
+
     pub fn cast(&self, list: Vec<u8>, query: &str) -> Result<String, JsValue> {
         self.0.cast(list, query).map_err(thrown)
     }

@@ -245,6 +245,13 @@ impl Session {
         bytes
     }
 
+    /// What is rendered of the picture in linear light: red, green and blue of each pixel, row by row from the top, as a PFM of the
+    /// program has them. Empty before the first pass.
+    pub fn light(&self) -> Vec<f32> {
+        let Some(picture) = &self.picture else { return Vec::new() };
+        picture.light().pixels().iter().flat_map(|light| light.to_array()).collect()
+    }
+
     /// What rays hit, or what is at points: what `lumbre cast` prints. `query` is one of its names, `list` a CSV or a `.npy`.
     ///
     /// # Errors

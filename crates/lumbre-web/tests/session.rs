@@ -94,8 +94,11 @@ fn a_picture_has_the_pixels_of_a_png_of_the_facade() {
         .flat_map(|&light| [&lumbre::image::ToneMap::None.encode(light, 0.0).to_u8()[..], &[255]].concat())
         .collect();
     let mut session = open(SCENE);
+    assert!(session.light().is_empty());
     session.step(Duration::from_secs(600)).unwrap();
     assert_eq!(session.pixels(), expected);
+    let light: Vec<f32> = picture.image().pixels().iter().flat_map(|light| light.to_array()).collect();
+    assert_eq!(session.light(), light);
 }
 
 #[test]

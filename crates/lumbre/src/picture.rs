@@ -196,6 +196,11 @@ impl Picture {
         self.shown(Some(ImageFormat::Png), options)
     }
 
+    /// The picture over its background, in linear light: the numbers that [`Picture::encode`] writes into a PFM.
+    pub fn light(&self) -> Cow<'_, Image> {
+        self.shown(Some(ImageFormat::Pfm), &SaveOptions::default()).0
+    }
+
     /// The image over its background, and the options for writing what is left to do to it.
     fn shown(&self, format: Option<ImageFormat>, options: &SaveOptions) -> (Cow<'_, Image>, SaveOptions) {
         let PixelBounds { x0, y0, .. } = self.bounds();

@@ -81,19 +81,19 @@ impl Runs {
         for ending in ["pbrt", "glb"] {
             for scene in files::with_ending(&root().join("scenes"), ending)? {
                 let scene = relative(&scene);
-                let run = picture(&scene, "--size 48x36 --spp 2 --denoise none", "picture.exr");
+                let run = picture(&scene, "--size 48x36 --spp 2 --denoise none", "picture.pfm");
                 alone.push((format!("`{scene}`"), vec![run]));
             }
         }
         let kinds = kinds()?;
         for (kind, scenes) in &kinds {
-            let run = |scene: &String| picture(scene, "--size 24x18 --spp 2", "picture.exr");
+            let run = |scene: &String| picture(scene, "--size 24x18 --spp 2", "picture.pfm");
             alone.push((format!("the book's {}", plural(kind)), scenes.iter().map(run).collect()));
         }
         let glass = "scenes/glass/glass.pbrt";
         for (row, options, name) in [
             ("in three wavelengths", "--spectral", "picture.exr"),
-            ("by photons", "--integrator caustics", "picture.exr"),
+            ("by photons", "--integrator caustics", "picture.pfm"),
             ("denoised, mapped to 8 bits", "--denoise own --tonemap agx", "picture.png"),
             ("as JPEG", "--exposure 0.5", "picture.jpg"),
         ] {
@@ -102,7 +102,7 @@ impl Runs {
         }
         alone.push((
             "a scene of POV-Ray".to_owned(),
-            vec![picture("docs/pictures/pov.pov", "--size 32x24 --spp 2", "picture.exr")],
+            vec![picture("docs/pictures/pov.pov", "--size 32x24 --spp 2", "picture.pfm")],
         ));
 
         let Some(shapes) = kinds.get("shape") else { bail!("no pictures of shapes") };

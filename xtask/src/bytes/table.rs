@@ -13,8 +13,8 @@ const EQUAL: &str = "equal";
 #[derive(Debug, PartialEq)]
 pub(super) struct Table {
     programs: Vec<String>,
-    /// Names, and hashes as far as there are any: one for each program in turn.
-    rows: Vec<(String, Vec<String>)>,
+    /// Names, and a hash for each program in turn; none where the program does not have what is asked.
+    rows: Vec<(String, Vec<Option<String>>)>,
 }
 
 /// What a page keeps: the hash of each row, and for which programs it is known to be theirs.
@@ -29,9 +29,9 @@ impl Table {
         Self { programs, rows: Vec::new() }
     }
 
-    /// The hash of the next program.
-    pub(super) fn put(&mut self, row: &str, hash: blake3::Hash) {
-        let hash = hash.to_hex()[..DIGITS].to_owned();
+    /// The hash of the next program, if it has one.
+    pub(super) fn put(&mut self, row: &str, hash: Option<blake3::Hash>) {
+        let hash = hash.map(|hash| hash.to_hex()[..DIGITS].to_owned());
         match self.rows.iter_mut().find(|(name, _)| name == row) {
             Some((_, hashes)) => hashes.push(hash),
             None => self.rows.push((row.to_owned(), vec![hash])),
@@ -43,9 +43,12 @@ impl Table {
     pub(super) fn check_equal(&self) -> Result<()> {
         let mut differences = Vec::new();
         for (name, hashes) in &self.rows {
+            let first = first(name, hashes)?;
             for (program, hash) in self.programs.iter().zip(hashes) {
-                if *hash != hashes[0] {
-                    differences.push(format!("{name}: {program} {hash}, {} {}", self.programs[0], hashes[0]));
+                if let Some(hash) = hash
+                    && hash != first
+                {
+                    differences.push(format!("{name}: {program} {hash}, {} {first}", self.programs[0]));
                 }
             }
         }
@@ -68,7 +71,8 @@ impl Table {
         let kept = Kept::read(&std::fs::read_to_string(page)?)?;
         let hashes = |(name, hash, _): &(String, String, Vec<bool>)| (name.clone(), hash.clone());
         let kept: Vec<_> = kept.rows.iter().map(hashes).collect();
-        let ours: Vec<_> = self.rows.iter().map(|(name, hashes)| (name.clone(), hashes[0].clone())).collect();
+        let ours = self.rows.iter().map(|(name, hashes)| Ok((name.clone(), first(name, hashes)?.clone())));
+        let ours: Vec<_> = ours.collect::<Result<_>>()?;
         let differing = |row: &&(String, String)| !kept.contains(row);
         let names: Vec<&str> = ours.iter().filter(differing).map(|(name, _)| name.as_str()).collect();
         if names.is_empty() && kept.len() == ours.len() {
@@ -87,24 +91,30 @@ impl Table {
         let text = std::fs::read_to_string(page)?;
         let kept = Kept::read(&text)?;
         let (before, _, after) = parted(&text)?;
-        std::fs::write(page, format!("{before}{START}{}{END}{after}", self.over(&kept).written()))?;
+        std::fs::write(page, format!("{before}{START}{}{END}{after}", self.over(&kept)?.written()))?;
         eprintln!("{}", page.display());
         Ok(())
     }
 
     /// This, and what was known of other programs.
-    fn over(&self, kept: &Kept) -> Kept {
+    fn over(&self, kept: &Kept) -> Result<Kept> {
         let others: Vec<usize> =
             (0..kept.programs.len()).filter(|&i| !self.programs.contains(&kept.programs[i])).collect();
         let rows = self.rows.iter().map(|(name, hashes)| {
-            let hash = &hashes[0];
+            let hash = first(name, hashes)?;
             let before = kept.rows.iter().find(|(row, kept, _)| row == name && kept == hash);
             let known = others.iter().map(|&i| before.is_some_and(|(_, _, equal)| equal[i]));
-            (name.clone(), hash.clone(), hashes.iter().map(|_| true).chain(known).collect())
+            Ok((name.clone(), hash.clone(), hashes.iter().map(Option::is_some).chain(known).collect()))
         });
         let others = others.iter().map(|&i| kept.programs[i].clone());
-        Kept { rows: rows.collect(), programs: self.programs.iter().cloned().chain(others).collect() }
+        let rows = rows.collect::<Result<_>>()?;
+        Ok(Kept { rows, programs: self.programs.iter().cloned().chain(others).collect() })
     }
+}
+
+/// The hash that the others of a row are compared with: that of this machine.
+fn first<'a>(row: &str, hashes: &'a [Option<String>]) -> Result<&'a String> {
+    hashes.first().and_then(Option::as_ref).with_context(|| format!("{row}: this machine has no hash"))
 }
 
 /// What stands before the table, its lines, and what follows.
@@ -153,11 +163,11 @@ mod tests {
     fn table(hashes: [&[u8]; 2]) -> Table {
         let mut table = Table::new(vec!["one".to_owned(), "two".to_owned()]);
         for hash in hashes {
-            table.put("a row", blake3::hash(hash));
+            table.put("a row", Some(blake3::hash(hash)));
         }
         for row in [WHOLE, RESUMED, MERGED] {
-            table.put(row, blake3::hash(b"picture"));
-            table.put(row, blake3::hash(b"picture"));
+            table.put(row, Some(blake3::hash(b"picture")));
+            table.put(row, Some(blake3::hash(b"picture")));
         }
         table
     }
@@ -172,7 +182,7 @@ mod tests {
     #[test]
     fn a_render_that_was_shared_out_is_that_of_one_run() {
         let mut other = table([b"a", b"a"]);
-        other.rows.last_mut().unwrap().1[0] = "0".to_owned();
+        other.rows.last_mut().unwrap().1[0] = Some("0".to_owned());
         let error = other.check_equal().unwrap_err().to_string();
         assert!(error.contains(MERGED) && !error.contains(RESUMED), "{error}");
     }
@@ -187,12 +197,12 @@ mod tests {
         table([b"a", b"a"]).write(&file).unwrap();
         let text = std::fs::read_to_string(&file).unwrap();
         assert!(text.starts_with("text\n") && text.ends_with("\nmore\n"), "{text}");
-        assert_eq!(Kept::read(&text).unwrap(), table([b"a", b"a"]).over(&nothing));
+        assert_eq!(Kept::read(&text).unwrap(), table([b"a", b"a"]).over(&nothing).unwrap());
         table([b"a", b"a"]).compare(&file).unwrap();
 
         let mut alone = Table::new(vec!["three".to_owned()]);
         for (row, hash) in [("a row", &b"b"[..]), (WHOLE, b"picture")] {
-            alone.put(row, blake3::hash(hash));
+            alone.put(row, Some(blake3::hash(hash)));
         }
         assert!(alone.compare(&file).unwrap_err().to_string().contains("(a row)"));
         alone.write(&file).unwrap();
@@ -200,5 +210,17 @@ mod tests {
         assert_eq!(kept.programs, ["three", "one", "two"]);
         assert_eq!(kept.rows[0].2, [true, false, false]);
         assert_eq!(kept.rows[1].2, [true, true, true]);
+    }
+
+    #[test]
+    fn what_a_program_does_not_have_is_an_empty_cell() {
+        let mut lacking = table([b"a", b"b"]);
+        lacking.rows[0].1[1] = None;
+        lacking.check_equal().unwrap();
+        let kept = lacking.over(&Kept { programs: Vec::new(), rows: Vec::new() }).unwrap();
+        assert_eq!(kept.rows[0].2, [true, false]);
+        // This machine's own program has all rows.
+        lacking.rows[0].1[0] = None;
+        assert!(lacking.check_equal().unwrap_err().to_string().starts_with("a row: "));
     }
 }

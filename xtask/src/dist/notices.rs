@@ -37,10 +37,16 @@ struct Package {
 const LICENCES: [&str; 6] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "COPYRIGHT", "UNLICENSE"];
 
 impl Dependencies {
-    /// Those of packages of the workspace, by cargo's own graph, without what only tests, builds and macros need.
+    /// Those of packages of the workspace on all platforms of programs and wheels, by cargo's own graph, without what only
+    /// tests, builds and macros need.
     pub(super) fn of(roots: &[&str]) -> Result<Self> {
+        Self::on(&TARGETS.iter().map(|target| target.triple).collect::<Vec<_>>(), roots)
+    }
+
+    /// The same on other platforms.
+    pub(super) fn on(triples: &[&str], roots: &[&str]) -> Result<Self> {
         let mut arguments = vec!["metadata", "--format-version", "1", "--locked"];
-        arguments.extend(TARGETS.iter().flat_map(|target| ["--filter-platform", target.triple]));
+        arguments.extend(triples.iter().flat_map(|triple| ["--filter-platform", triple]));
         let text = command::output("cargo", &arguments)?;
         let metadata: Value = serde_json::from_str(&text).context("cargo metadata is no JSON")?;
         let lock = fs::read_to_string(root().join("Cargo.lock")).context("cannot read Cargo.lock")?;
@@ -209,6 +215,13 @@ fn text_of(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_platform_has_its_own_dependencies() {
+        let dependencies = Dependencies::on(&["wasm32-unknown-unknown"], &["lumbre-web"]).expect("the graph");
+        let has = |name: &str| dependencies.packages.iter().any(|package| package.name == name);
+        assert!(has("wasm-bindgen") && has("lumbre-kernel") && !has("winapi-util"), "{dependencies:?}");
+    }
 
     #[test]
     fn every_dependency_has_a_licence_with_its_text() {

@@ -65,6 +65,10 @@ impl<H> OnX86 for H {}
 
 impl Isa {
     /// Runs a task that is only compiled for instruction sets with vectors.
+    #[cfg_attr(
+        not(any(target_arch = "aarch64", target_arch = "x86_64")),
+        allow(unused_variables, reason = "there is no instruction set that takes the task")
+    )]
     #[inline(always)]
     pub(crate) fn run_with_vectors<T: Dispatch>(self, task: T) -> T::Output {
         match self.0 {

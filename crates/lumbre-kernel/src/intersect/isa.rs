@@ -31,6 +31,10 @@ impl Isa {
     }
 
     /// All that this machine has, the best last.
+    #[cfg_attr(
+        not(any(target_arch = "aarch64", target_arch = "x86_64")),
+        allow(unused_mut, reason = "the portable one is all")
+    )]
     pub(crate) fn all() -> Vec<Self> {
         let mut all = vec![Self(Set::Portable)];
         // Every processor of this architecture has it.

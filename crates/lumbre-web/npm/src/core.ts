@@ -97,6 +97,11 @@ export class Scene {
     return this.#lumbre.call(() => this.#inner.pixels());
   }
 
+  /** The same in linear light: red, green and blue of each pixel, as a PFM of the program has them. */
+  light(): Float32Array {
+    return this.#lumbre.call(() => this.#inner.light());
+  }
+
   /**
    * What rays hit, or what is at points: what `lumbre cast` prints.
    * @param list CSV with a header, such as `ox,oy,oz,dx,dy,dz`, or the bytes of a `.npy`.

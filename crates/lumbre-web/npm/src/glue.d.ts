@@ -9,6 +9,7 @@ declare module "lumbre-glue" {
     limitRows(from: number, to: number): void;
     step(milliseconds: number): string;
     pixels(): Uint8Array;
+    light(): Float32Array;
     cast(list: Uint8Array, query: string): string;
     explain(wanted: string): string;
     free(): void;

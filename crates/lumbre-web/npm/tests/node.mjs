@@ -43,7 +43,7 @@ const SIZE = [48, 36];
 const names = readdirSync(join(root, "scenes")).sort();
 
 const tests = {
-  "every scene of the repository has the pixels of the program"() {
+  "every scene of the repository has the pixels and the light of the program"() {
     for (const name of names) {
       const { files, main, path } = scene(name);
       const opened = lumbre.open(files, main, { size: SIZE, spp: 2 });
@@ -53,6 +53,14 @@ const tests = {
       const expected = PNG.sync.read(readFileSync(out));
       assert.deepEqual([expected.width, expected.height], [opened.width, opened.height], name);
       assert.ok(Buffer.from(found).equals(expected.data), `${name}: the pixels differ`);
+      const pfm = join(temporary, `${name}.pfm`);
+      native("render", path, "--size", SIZE.join("x"), "--spp", "2", "-o", pfm, "-q");
+      const rows = readFileSync(pfm).subarray(-12 * SIZE[0] * SIZE[1]);
+      const light = Buffer.from(opened.light().buffer);
+      for (let y = 0; y < SIZE[1]; y++) {
+        const row = (of, at) => of.subarray(12 * SIZE[0] * at, 12 * SIZE[0] * (at + 1));
+        assert.ok(row(light, y).equals(row(rows, SIZE[1] - 1 - y)), `${name}: the light of row ${y} differs`);
+      }
       opened.close();
     }
   },
