@@ -147,7 +147,7 @@ impl Predicted {
     /// As `lumbre render` makes it, where no option asks for another. `held` bytes are the scene.
     fn of(scene: &Scene, defaults: &Defaults, held: u64) -> Result<Self, lumbre::Error> {
         // The program itself, with its tables and the columns of its threads.
-        const PROGRAM: u64 = 20 << 20;
+        const PROGRAM: u64 = 18 << 20;
         let mut options = scene.options();
         options.transparent = defaults.background().is_some();
         options.guides = defaults.denoises();

@@ -1198,7 +1198,7 @@ fn four_sets_of_texture_coordinates_serve_one_material() {
     let (scene, warnings) = with_sets(4, [0, 1, 2, 3, 3]);
     assert_eq!(warnings, [""; 0]);
     let mesh = mesh(&scene.shapes[0]);
-    for (set, uvs) in std::iter::once(&mesh.uvs).chain(mesh.further_uvs.as_deref().unwrap()).enumerate() {
+    for (set, uvs) in std::iter::once(&mesh.uvs).chain(&mesh.further_uvs).enumerate() {
         let found = of_third_vertex(mesh, uvs.as_ref().unwrap());
         assert!((found - in_the_file(set)).length() < 1e-6, "{set}");
     }
@@ -1217,9 +1217,7 @@ fn texture_coordinate_sets_that_materials_use_are_kept() {
     let (scene, warnings) = with_sets(8, [7, 3, 7, 3, 7]);
     assert_eq!(warnings, [""; 0]);
     let mesh = mesh(&scene.shapes[0]);
-    let Some([Some(second), None, None]) = mesh.further_uvs.as_deref() else {
-        panic!("{:?}", mesh.further_uvs)
-    };
+    let [Some(second), None, None] = &mesh.further_uvs else { panic!("{:?}", mesh.further_uvs) };
     for (uvs, set) in [(mesh.uvs.as_ref().unwrap(), 7), (second, 3)] {
         assert!((of_third_vertex(mesh, uvs) - in_the_file(set)).length() < 1e-6, "{set}");
     }

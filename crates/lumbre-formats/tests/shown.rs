@@ -326,7 +326,7 @@ fn a_map_to_one_point_shows_one_colour() {
         assert_eq!(mesh.uvs.as_deref(), Some(&[Vec2::new(0.75, 0.5); 3][..]));
         // The set itself is kept for textures of the material.
         let raw: Vec<Vec2> = [[3.0, 1.0], [2.0, 1.0], [4.0, -1.0]].map(Vec2::from).to_vec();
-        assert_eq!(mesh.further_uvs.as_ref().unwrap()[0].as_deref(), Some(&raw[..]));
+        assert_eq!(mesh.further_uvs[0].as_deref(), Some(&raw[..]));
         if let MaterialKind::Principled(params) = &scene.materials[0].material.kind {
             let lumbre_shading::Texture::Image(base) = &*params.base_color else { panic!() };
             assert!(matches!(base.mapping, Mapping2d::Affine { set: UvSet::Second, .. }));

@@ -98,7 +98,7 @@ fn what_changes_its_form_is_seen_in_all_of_them() {
     });
     // The mirror turns the faces round, and the coordinates have turned them already.
     mesh.positions.clone_from(&moments[1].positions);
-    mesh.motion = Some(Box::new(MeshMotion { start: 2.0, end: 6.0, moments: moments.to_vec() }));
+    mesh.motion = Some(MeshMotion { start: 2.0, end: 6.0, moments: moments.to_vec() });
     desc.shapes[0].world_from_object = place;
     desc.cameras = vec![flat_camera()];
     let scene = Scene::build(desc).unwrap();
@@ -133,7 +133,7 @@ fn meshes_whose_moments_do_not_fit_are_refused() {
         let moment = MeshMoment { positions: mesh.positions.clone(), normals: None };
         let mut motion = MeshMotion { start: 0.0, end: 1.0, moments: vec![moment.clone(), moment] };
         change(&mut motion);
-        mesh.motion = Some(Box::new(motion));
+        mesh.motion = Some(motion);
         Scene::build(desc).map(|_| ()).unwrap_err().to_string()
     };
     assert!(refused(|m| m.moments[1].positions.truncate(3)).contains("moving positions"));

@@ -582,9 +582,10 @@ impl Builder {
     }
 
     fn shape_light(&mut self, id: u32, shape: PlacedShape, standing: &Standing) {
-        let Some(emission) = &self.entries[id as usize].emission else { return };
-        let power = power(emission.mean(), emission.sides(), standing.area_factor() * shape.area());
-        self.area_light(id, Light::Shape(ShapeLight { entry: id, shape, power }), standing);
+        let light = ShapeLight::new(id, &self.entries[id as usize], shape, standing.area_factor());
+        if let Some(light) = light {
+            self.area_light(id, Light::Shape(light), standing);
+        }
     }
 
     fn mesh_light(

@@ -224,8 +224,8 @@ pub struct MeshDesc {
     /// Tangents, with the side of the bitangent of normal maps: 1 for normal × tangent, -1 for its opposite, in
     /// the mesh's own space (a mirror flips it); 0 for normal × tangent even under a mirror.
     pub tangents: Option<Vec<Vec4>>,
-    /// The second, third and fourth uv set, if there are any.
-    pub further_uvs: Option<Box<FurtherUvs>>,
+    /// The second, third and fourth uv set.
+    pub further_uvs: FurtherUvs,
     /// Linear colours.
     pub colours: Option<Vec<Rgb>>,
     /// Alphas.
@@ -234,7 +234,7 @@ pub struct MeshDesc {
     pub face_indices: Option<Vec<u32>>,
     /// Its deformation, if any; the vertices above are then those at some time. Its quads are split into
     /// triangles, flat or not, and its tangents do not change.
-    pub motion: Option<Box<MeshMotion>>,
+    pub motion: Option<MeshMotion>,
 }
 
 /// The second, third and fourth uv set of a mesh.

@@ -15,6 +15,7 @@ mod placed;
 pub(crate) mod portal;
 mod projection;
 mod rectangle;
+mod texels;
 mod tree;
 
 use lumbre_geometry::{Aabb, Ray, Surface};
@@ -344,7 +345,7 @@ impl Light {
             Self::Uniform(light) => PI * disk * mean(light.radiance),
             Self::Environment(light) => PI * disk * light.mean(),
             Self::Portal(light) => light.power(),
-            Self::Shape(light) => light.power,
+            Self::Shape(light) => light.power(),
             Self::Mesh(light) => light.power,
             Self::Placed(light) => light.power(scene_radius),
             Self::Moving(light) => light.light.power(scene_radius),

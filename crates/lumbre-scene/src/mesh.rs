@@ -113,7 +113,7 @@ pub(crate) fn bake(
     let mesh = Arc::new(TriangleMesh { origin, positions, indices: triangles });
     let precise = precise.map(|positions| Arc::new(PreciseMesh { positions, indices: mesh.indices.clone() }));
     let moving =
-        motion.map(|motion| deforming(shape, *motion, tree_from_object, &mesh).map(Box::new)).transpose()?;
+        motion.map(|motion| deforming(shape, motion, tree_from_object, &mesh).map(Box::new)).transpose()?;
     let turned = (turned.normals.is_some() || turned.tangents.is_some()).then(|| Box::new(turned));
     let is_bare = Arc::get_mut(&mut shared).is_some_and(|own| *own == MeshDesc::default());
     let rest = if is_bare { BARE.clone() } else { shared };
@@ -160,7 +160,7 @@ fn deforming(
 
 fn check(shape: u32, desc: &MeshDesc) -> Result<(), BuildError> {
     let expected = desc.positions.len();
-    let further = |set: usize| desc.further_uvs.as_ref().and_then(|sets| sets[set].as_ref()).map(Vec::len);
+    let further = |set: usize| desc.further_uvs[set].as_ref().map(Vec::len);
     let lists = [
         ("precise positions", desc.precise_positions.as_ref().map(Vec::len)),
         ("normals", desc.normals.as_ref().map(Vec::len)),

@@ -204,7 +204,8 @@ mod tests {
 
     #[test]
     fn an_unbounded_mirror_counts_as_far_as_the_scene_reaches() {
-        let plane = shape(GeometryDesc::Exact(Plane::new(DVec3::ZERO, DVec3::Y).unwrap().into()), 1, DVec3::ZERO);
+        let plane =
+            shape(GeometryDesc::Exact(Plane::new(DVec3::ZERO, DVec3::Y).unwrap().into()), 1, DVec3::ZERO);
         let spheres = scene(vec![plane, ball(0, DVec3::Y)], vec![], vec![]).specular_spheres().to_vec();
         assert_eq!(spheres.len(), 1);
         assert!(spheres[0].contains(DVec3::ZERO) && !spheres[0].contains(DVec3::new(9.0, 0.0, 0.0)));

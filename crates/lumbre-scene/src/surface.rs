@@ -601,7 +601,7 @@ impl MeshAttributes {
             let coverages = corners.map(|i| DVec3::splat(f64::from(coverages[i as usize])));
             vertex.coverage = blend.value(coverages).x as f32;
         }
-        for (list, place) in self.rest.further_uvs.iter().flat_map(|sets| &**sets).zip(&mut vertex.further) {
+        for (list, place) in self.rest.further_uvs.iter().zip(&mut vertex.further) {
             let Some(list) = list else { continue };
             let flat = |uv: Vec2| uv.as_dvec2().extend(0.0);
             let further = corners.map(|i| flat(list[i as usize]));

@@ -7,8 +7,9 @@ mod lit;
 use std::sync::Arc;
 
 use lit::{lights_of_all_kinds, rectangle_of_triangles, shining, sky_under};
-use lumbre_geometry::Ray;
+use lumbre_geometry::{Cylinder, Disk, Ray, Shape, Sphere};
 use lumbre_image::{Bitmap, Channels, Encoding, Image, PixelData, Rgb};
+use lumbre_math::frame::orthonormal_basis;
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec2, DVec3, Transform, Vec2, warp64};
 use lumbre_scene::{
@@ -345,5 +346,86 @@ fn a_nan_texel_is_named_and_the_rest_of_the_sky_shines() {
         let said: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
         assert_eq!(said, ["light 0: texel (9, 5) of its picture is not finite, and taken for black"]);
         assert_eq!(scene.lights().len(), 1);
+    }
+}
+
+/// A lamp whose picture is dim but for one texel in 4,096, and its scene.
+fn pictured_lamp(shape: Shape, world_from_object: Transform) -> Scene {
+    const SIDE: usize = 64;
+    let mut texels = vec![0.02; 3 * SIDE * SIDE];
+    texels[3 * (SIDE * 21 + 5)..][..3].fill(400.0);
+    let bitmap = Bitmap::new(64, 64, Channels::Rgb, PixelData::F32(texels), Encoding::Linear).unwrap();
+    let image = Arc::new(MipMap::new(Arc::new(bitmap), MipMapOptions::default()));
+    let mut lamp = shining(1, GeometryDesc::Exact(shape), 1.5, false);
+    lamp.world_from_object = world_from_object;
+    lamp.area_light.as_mut().unwrap().image = Some(image);
+    let material = NamedMaterial { name: None, material: Arc::new(Material::default_diffuse()) };
+    let desc = SceneDesc { shapes: vec![lamp], materials: vec![material], ..SceneDesc::default() };
+    Scene::build(desc).unwrap()
+}
+
+#[test]
+fn one_bright_texel_of_a_disk_a_sphere_and_a_tube_is_found() {
+    let ball = Sphere::new(DVec3::new(0.5, 0.0, 0.0), 1.5).unwrap();
+    let plate = Disk::new(DVec3::ZERO, DVec3::Z, 2.0, 0.0).unwrap();
+    let tube = Cylinder::new(DVec3::ZERO, DVec3::new(0.0, 0.0, 2.0), 0.5, false).unwrap();
+    let map = Transform::translate(DVec3::new(0.3, -0.2, 4.0))
+        * Transform::rotate(DVec3::new(1.0, 2.0, 0.5), 25.0).unwrap()
+        * Transform::scale(DVec3::new(1.5, 1.0, 1.0)).unwrap();
+    let mut random = RandomStream::new(31);
+    let bright = DVec2::new(5.5, 21.5) / 64.0;
+    // Each with half the side of a square at distance 1 that covers it.
+    for (shape, half) in [(Shape::from(ball), 2.0), (Shape::from(plate), 2.5), (Shape::from(tube), 0.8)] {
+        let name = shape.name();
+        // In front of the bright texel, wherever the picture's rows begin.
+        let seen = [bright, DVec2::new(bright.x, 1.0 - bright.y)]
+            .map(|uv| shape.surface_at(0, uv).unwrap().placed(&map));
+        let scene = pictured_lamp(shape, map);
+        let from = 0.5 * (seen[0].point + seen[1].point) + 3.0 * seen[0].normal;
+        let towards = (seen[0].point - from).normalize();
+        // By directions in the cone around the lamp, without the light's own sampling.
+        let radiance = |direction: DVec3| {
+            let ray = Ray::new(from, direction);
+            let hit = scene.closest(&ray);
+            hit.map_or(0.0, |hit| {
+                let met = scene.interaction(&ray, &hit, &Footprint::Point);
+                f64::from(met.emitted().average())
+            })
+        };
+        const GRID: u32 = 400;
+        let (e1, e2) = orthonormal_basis(towards);
+        let mut expected = 0.0;
+        let step = 2.0 * half / f64::from(GRID);
+        for i in 0..GRID * GRID {
+            let s = (DVec2::new(f64::from(i % GRID), f64::from(i / GRID)) + 0.5) * step - half;
+            let way = towards + s.x * e1 + s.y * e2;
+            let cosine = 1.0 / way.length();
+            expected += radiance(way.normalize()) * cosine.powi(4) * step * step;
+        }
+        let (mut mean, mut square, mut same, mut met_it) = (0.0, 0.0, 0, 0);
+        const COUNT: u32 = 4096;
+        for i in 0..COUNT {
+            let jitter = DVec2::new(random.next_f64(), random.next_f64());
+            let u = (DVec2::new(f64::from(i % 64), f64::from(i / 64)) + jitter) / 64.0;
+            let Some(sample) = scene.sample_light(from, towards, 0.0, random.next_f64(), u) else { continue };
+            let ray = Ray::new(from, sample.towards);
+            let Some(hit) = scene.closest(&ray) else { continue };
+            let met = scene.interaction(&ray, &hit, &Footprint::Point);
+            let is_near = sample.end.is_some_and(|end| (end.point - met.surface.point).length() < 1e-4);
+            if !is_near {
+                continue;
+            }
+            let Scatter::Density(pdf) = sample.scatter else { panic!("{sample:?}") };
+            met_it += 1;
+            same += u32::from((scene.light_pdf(from, towards, &met) / pdf - 1.0).abs() < 1e-3);
+            let light = flux(Some(sample)) * sample.towards.dot(towards);
+            mean += light / f64::from(COUNT);
+            square += light * light / f64::from(COUNT);
+        }
+        assert!(met_it > COUNT / 4, "{name}: {met_it}");
+        assert!((mean / expected - 1.0).abs() < 0.06, "{name}: {mean} {expected}");
+        // By direction alone it is some hundred times the square of the mean.
+        assert!(square < 8.0 * expected * expected, "{name}: {square} {expected}");
+        assert!(same > met_it - met_it / 50, "{name}: {same} of {met_it}");
     }
 }

@@ -586,7 +586,6 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
         list
     };
     let further_uvs = further.map(|set| set.map(&mut coordinates));
-    let further_uvs = further_uvs.iter().any(Option::is_some).then(|| Box::new(further_uvs));
     let uvs = dressing.sets.is_some().then(|| {
         let mut uvs = coordinates(first);
         if baked != lumbre_math::glam::Affine2::IDENTITY {
@@ -616,8 +615,11 @@ fn mesh_of(mut vertices: Vertices, triangles: Vec<[u32; 3]>, dressing: &Dressing
         colours,
         coverages,
         face_indices: None,
-        motion: (!vertices.moments.is_empty())
-            .then(|| Box::new(MeshMotion { start: 0.0, end: 1.0, moments: vertices.moments })),
+        motion: (!vertices.moments.is_empty()).then_some(MeshMotion {
+            start: 0.0,
+            end: 1.0,
+            moments: vertices.moments,
+        }),
     })
 }
 

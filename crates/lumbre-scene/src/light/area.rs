@@ -1,9 +1,12 @@
 //! Area lights of one exact shape.
 
+use std::sync::Arc;
+
 use lumbre_geometry::{PlacedShape, Ray, Roots, Shape, Surface};
 use lumbre_math::{DVec2, DVec3};
 use lumbre_shading::{FloatTexture, Scatter, Spectrum};
 
+use super::texels::Texels;
 use super::tree::{Emitter, Facing};
 use super::{LightPoint, LightSample};
 use crate::Emission;
@@ -14,19 +17,54 @@ use crate::surface::SurfaceEntry;
 pub struct ShapeLight {
     /// Its surface entry in the scene.
     pub(crate) entry: u32,
-    pub(crate) shape: PlacedShape,
-    pub(crate) power: f64,
+    shape: PlacedShape,
+    power: f64,
+    /// Where its image shines, if that is far from uniform.
+    texels: Option<Arc<Texels>>,
 }
 
 impl ShapeLight {
+    /// The light of the entry with this number. Areas in the world are larger by a factor. `None` if it does not emit.
+    pub(crate) fn new(
+        number: u32,
+        entry: &SurfaceEntry,
+        shape: PlacedShape,
+        area_factor: f64,
+    ) -> Option<Self> {
+        let emission = entry.emission.as_ref()?;
+        let texels = Texels::of(entry, &shape).map(Arc::new);
+        let mean =
+            texels.as_ref().map_or_else(|| emission.mean(), |texels| Spectrum::splat(texels.mean as f32));
+        let power = power(mean, emission.sides(), area_factor * shape.area());
+        Some(Self { entry: number, shape, power, texels })
+    }
+
+    pub(super) fn power(&self) -> f64 {
+        self.power
+    }
+
     pub(super) fn sample(&self, entry: &SurfaceEntry, from: DVec3, u: DVec2) -> Option<LightSample> {
-        let sample = self.shape.sample_direction(from, u)?;
-        // The coordinates of a face are its uv, unless vertices override them.
-        arriving(entry, &sample.surface, 0, sample.surface.uv, from, sample.pdf)
+        let Some(texels) = &self.texels else {
+            let sample = self.shape.sample_direction(from, u)?;
+            // The coordinates of a face are its uv, unless vertices override them.
+            return arriving(entry, &sample.surface, 0, sample.surface.uv, from, sample.pdf);
+        };
+        // Half of the samples by direction: the texels say nothing of what is near.
+        let surface = if u.x < 0.5 {
+            self.shape.sample_direction(from, DVec2::new(2.0 * u.x, u.y))?.surface
+        } else {
+            texels.sample(&self.shape, DVec2::new(2.0 * u.x - 1.0, u.y))?
+        };
+        let pdf = self.pdf(&Ray::new(from, surface.point - from), &surface);
+        arriving(entry, &surface, 0, surface.uv, from, pdf)
     }
 
     pub(super) fn pdf(&self, ray: &Ray, surface: &Surface) -> f64 {
-        self.shape.pdf_direction(ray, surface)
+        let by_direction = self.shape.pdf_direction(ray, surface);
+        match &self.texels {
+            None => by_direction,
+            Some(texels) => 0.5 * (by_direction + texels.pdf(&self.shape, ray.origin, surface)),
+        }
     }
 
     /// The surface at this point of a ray from `from`.

@@ -358,7 +358,7 @@ fn corner(mesh: &TriangleMesh, vertex: u32) -> DVec3 {
 /// The density per unit solid angle of uniform sampling by area: distance² / (|cos θ| area). `None` when seen
 /// edge-on.
 #[inline]
-fn per_solid_angle(area: f64, arm: DVec3, normal: DVec3) -> Option<f64> {
+pub(super) fn per_solid_angle(area: f64, arm: DVec3, normal: DVec3) -> Option<f64> {
     let squared = arm.length_squared();
     let pdf = squared * squared.sqrt() / (normal.dot(arm).abs() * area);
     (pdf > 0.0 && pdf.is_finite()).then_some(pdf)

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use lumbre_geometry::{Disk, Shape, Sphere};
+use lumbre_geometry::{Disk, Sphere};
 use lumbre_image::{Image, Rgb};
 use lumbre_math::random::RandomStream;
 use lumbre_math::{DVec3, Transform, Vec3};
