@@ -182,7 +182,7 @@ export class FigureOf {
     const focused = this.#root.activeElement?.closest("[data-mark]")?.getAttribute("data-mark");
     const style = make("style", { textContent: `${(found.querySelector("style")?.textContent ?? "").replace(/:root/g, ":host").replace("color-scheme: light dark;", `color-scheme: ${isDark() ? "dark" : "light"};`).replace(/\bbody\b/g, ".body").replace(/\bhtml\b/g, ".none")}
 :host { display: block; } .body { margin: 0; max-width: none; padding: 0 0 1rem; background: transparent; font-size: 15px; } h1, #steps { display: none !important; }
-.figured > details > figure { position: static !important; } .sketch [data-mark="O"], .sketch [data-mark="D"], .sketch .mark { cursor: grab; } .sketch { touch-action: none; }` });
+.figured > details > figure { position: static !important; } .sketch [data-mark="O"], .sketch [data-mark="D"], .sketch .mark { cursor: grab; } .sketch .moving { pointer-events: none; } .sketch { touch-action: none; }` });
     const body = make("div", { className: "body" });
     const main = found.querySelector("main");
     const steps = found.getElementById("steps");
