@@ -85,17 +85,13 @@ const GONE: &[(Scope, &str, &str)] = &[
 /// Columns of a comment, outside of [`WIDE_FOLDERS`].
 const MAX_COLUMNS: usize = 120;
 /// Where comments are still wider.
-const WIDE_FOLDERS: [&str; 11] = [
-    "crates/lumbre-cli/",
+const WIDE_FOLDERS: [&str; 7] = [
     "crates/lumbre-formats/",
     "crates/lumbre-geometry/src/explain/",
-    "crates/lumbre-kernel/src/simd/neon.rs",
     "crates/lumbre-render/src/caustics/",
     "crates/lumbre-scene/src/light/",
     "crates/lumbre-scene/src/light.rs",
-    "crates/lumbre-simd/src/neon.rs",
     "crates/lumbre-web/",
-    "xtask/src/arm.rs",
     "xtask/src/dist",
 ];
 /// Characters of a test's name.

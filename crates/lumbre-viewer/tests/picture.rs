@@ -66,9 +66,13 @@ fn a_page_asks_for_pixels_and_for_what_a_ray_meets() {
     let picked = socket.wait_for("picked", |_| true);
     let hits = picked["ray"]["hits"].as_array().unwrap();
     assert_eq!((picked["request"].as_u64(), hits.len()), (Some(5), 2));
-    assert_eq!((hits[0]["kind"].as_str(), hits[0]["front"].as_bool()), (Some("sphere"), Some(true)));
+    assert_eq!(
+        (hits[0]["kind"].as_str(), hits[0]["surface"]["front"].as_bool()),
+        (Some("sphere"), Some(true))
+    );
     assert_eq!(hits[0]["material"], "<b>wood</b> (diffuse)");
-    let point: Vec<f64> = hits[0]["point"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
+    let point: Vec<f64> =
+        hits[0]["surface"]["point"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
     assert!((point.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.25).abs() < 1e-9, "{point:?}");
     socket.say(r#"{"type":"values","x":46,"y":30,"width":9,"height":9,"request":6}"#);
     let values = socket.wait_for("values", |_| true);
