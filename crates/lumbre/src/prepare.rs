@@ -1,5 +1,5 @@
-//! How the picture of a staged scene is made and shown unless the caller chooses otherwise: for the program, the viewer,
-//! Python and the browser alike.
+//! How the picture of a staged scene is made and shown unless the caller chooses otherwise: for the program, the
+//! viewer, Python and the browser alike.
 
 use lumbre_formats::image::ExrPrecision;
 use lumbre_image::ToneMap;

@@ -9,8 +9,8 @@ use smallvec::SmallVec;
 /// The solids around a point of a path, the innermost last: entered and not yet left.
 ///
 /// Solids are identified by the materials of their surfaces, so that one made of several meshes may be entered by one
-/// and left by another. Only the innermost medium applies. At its surface, its index of refraction is relative to that of the solid
-/// around it. If solids overlap without one containing the other, the one that was entered last counts.
+/// and left by another. Only the innermost medium applies. At its surface, its index of refraction is relative to that
+/// of the solid around it. If solids overlap without one containing the other, the one that was entered last counts.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MediumStack<'s> {
     around: SmallVec<[Entered<'s>; 2]>,
