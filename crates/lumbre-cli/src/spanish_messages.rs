@@ -22,8 +22,8 @@ type Table = &'static [(&'static str, &'static str)];
 const OF_SENTENCES: [Table; 5] = [SENTENCES, SCENES, MODELS, POV, FILES];
 /// The tables of what was found or expected.
 const OF_DETAILS: [Table; 5] = [DETAILS, SCENES, MODELS, POV, FILES];
-/// So many characters an entry has, beside its places, if it is a sentence.
-const LEAST_OF_A_SENTENCE: usize = 6;
+/// Minimum number of characters of a sentence, without those of its places.
+const MIN_SENTENCE: usize = 6;
 
 /// Sentences in both languages. `{}` stands for what comes from the scene, in the same order in both; `{=}` for what
 /// stays as it is.
@@ -324,7 +324,7 @@ fn line_in_spanish(line: &str) -> String {
 
 /// A sentence, which may be followed by its reason, in Spanish; and how many characters of it the tables have.
 fn sentence_in_spanish(text: &str) -> Option<(usize, String)> {
-    let known = |text| best(&OF_SENTENCES, text).filter(|&(known, _)| known >= LEAST_OF_A_SENTENCE);
+    let known = |text| best(&OF_SENTENCES, text).filter(|&(known, _)| known >= MIN_SENTENCE);
     let with_reason = text.match_indices(": ").filter_map(|(at, _)| {
         let (known_of_it, sentence) = known(&text[..at])?;
         let reason = &text[at + 2..];

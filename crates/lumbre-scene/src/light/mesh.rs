@@ -11,6 +11,7 @@ use super::brightness::{Brightness, Cells};
 use super::pairs::{Pair, pairs};
 use super::rectangle::Rectangle;
 use super::tree::{Emitter, Facing};
+use super::sample::per_solid_angle;
 use super::{LightPoint, LightSample, area};
 use crate::Emission;
 use crate::surface::{MeshAttributes, SurfaceEntry};
@@ -353,13 +354,4 @@ impl Piece {
 
 fn corner(mesh: &TriangleMesh, vertex: u32) -> DVec3 {
     mesh.origin + mesh.positions[vertex as usize].as_dvec3()
-}
-
-/// The density per unit solid angle of uniform sampling by area: distance² / (|cos θ| area). `None` when seen
-/// edge-on.
-#[inline]
-pub(super) fn per_solid_angle(area: f64, arm: DVec3, normal: DVec3) -> Option<f64> {
-    let squared = arm.length_squared();
-    let pdf = squared * squared.sqrt() / (normal.dot(arm).abs() * area);
-    (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
 }

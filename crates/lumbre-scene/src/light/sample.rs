@@ -50,3 +50,12 @@ impl LightPoint {
         Self { point, error: DVec3::ZERO, normal: DVec3::ZERO }
     }
 }
+
+/// The density per unit solid angle of uniform sampling by area: distance² / (|cos θ| area). `None` when seen
+/// edge-on.
+#[inline]
+pub(super) fn per_solid_angle(area: f64, arm: DVec3, normal: DVec3) -> Option<f64> {
+    let squared = arm.length_squared();
+    let pdf = squared * squared.sqrt() / (normal.dot(arm).abs() * area);
+    (pdf > 0.0 && pdf.is_finite()).then_some(pdf)
+}

@@ -4,7 +4,7 @@ use lumbre_geometry::{PlacedShape, Surface};
 use lumbre_math::distribution::PiecewiseConstant2D;
 use lumbre_math::{DVec2, DVec3, Vec2};
 
-use super::mesh::per_solid_angle;
+use super::sample::per_solid_angle;
 use crate::surface::{Form, SurfaceEntry};
 
 /// A density over the uv of a shape, proportional to the light of its cells.
