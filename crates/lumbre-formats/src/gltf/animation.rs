@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 
 use lumbre_math::{DQuat, DVec3, Elementary};
 
-use super::GltfOptions;
 use super::accessor::{Accessor, Component, Element};
 use super::file::{File, List};
 use super::json::{Read, Value};
+use super::options::GltfOptions;
 use super::pointer::{self, Changes};
 use crate::diagnostic::{Diagnostic, quoted};
 

@@ -7,6 +7,7 @@ use draco_core::{
 };
 
 use super::accessor::{Component, Element};
+use super::expansion::check_expansion;
 use super::file::{File, List};
 use super::json::{Read, Value};
 use crate::contained::contained;
@@ -93,7 +94,7 @@ fn unpack(
     let unpacked: u64 =
         wanted.iter().map(|(layout, ..)| layout.bytes()).fold(indices.bytes(), u64::saturating_add);
     let packed = bytes.len() as u64;
-    super::check_expansion(file, extension, "compressed data", packed, unpacked)?;
+    check_expansion(file, extension, "compressed data", packed, unpacked)?;
     // Corners, and the tables for them, during decoding.
     let hold = file.budget.hold(unpacked.saturating_mul(4), "compressed primitive")?;
     // Streams have numbers of up to 64 bits, and attributes that are not needed.

@@ -9,7 +9,8 @@ use super::animation::Playing;
 use super::file::{File, List};
 use super::graph::Graph;
 use super::json::Read;
-use super::{GltfOptions, scene};
+use super::options::GltfOptions;
+use super::scene;
 
 /// The number of segments of the exposure. Within one, a node must rotate by less than half a turn, or it would
 /// interpolate the other way.

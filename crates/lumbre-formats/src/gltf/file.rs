@@ -117,7 +117,7 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> File<'a> {
-    /// A file that is not loaded yet: see [`File::load`].
+    /// A file that is not loaded yet: see [`super::load`].
     pub(super) fn new(
         root: Value<'a>,
         name: &Arc<str>,
@@ -249,24 +249,27 @@ impl<'a> File<'a> {
     }
 
     /// Finds the lists and loads every buffer. `binary` is the GLB's own buffer.
-    pub(super) fn load(&mut self, binary: Option<&'a [u8]>, is_glb: bool) -> Read<()> {
+    pub(super) fn load_buffers(&mut self, binary: Option<&'a [u8]>, is_glb: bool) -> Read<()> {
         self.find_lists()?;
         for (index, &value) in self.lists[List::Buffers as usize].iter().enumerate() {
             let bytes = self.buffer(index, value, binary, is_glb)?;
             self.buffer_bytes += bytes.as_ref().map_or(0, |bytes| bytes.len() as u64);
             self.buffers.push(bytes);
         }
-        for &value in &self.lists[List::BufferViews as usize] {
-            let bytes = super::meshopt::unpacked(self, value)?;
-            self.buffer_bytes += bytes.as_ref().map_or(0, |bytes| bytes.len() as u64);
-            self.unpacked.push(bytes);
-        }
-        #[cfg(feature = "draco")]
-        {
-            self.filled = super::draco::filled(self)?;
-            self.buffer_bytes += self.filled.values().map(|bytes| bytes.len() as u64).sum::<u64>();
-        }
         Ok(())
+    }
+
+    /// Adds the bytes of the next buffer view if it was compressed; `None` if not.
+    pub(super) fn add_unpacked(&mut self, bytes: Option<Vec<u8>>) {
+        self.buffer_bytes += bytes.as_ref().map_or(0, |bytes| bytes.len() as u64);
+        self.unpacked.push(bytes);
+    }
+
+    /// Sets the elements of the accessors whose primitives were compressed.
+    #[cfg(feature = "draco")]
+    pub(super) fn set_filled(&mut self, filled: HashMap<usize, Vec<u8>>) {
+        self.buffer_bytes += filled.values().map(|bytes| bytes.len() as u64).sum::<u64>();
+        self.filled = filled;
     }
 
     fn buffer(

@@ -1,6 +1,7 @@
 //! Compressed buffer views (`EXT_meshopt_compression`, 2021, and its successor `KHR_meshopt_compression`, a draft of
 //! 2025; Khronos. The codecs are those of A. Kapoulkine's meshoptimizer).
 
+use super::expansion::check_expansion;
 use super::file::File;
 use super::json::{Read, Value};
 use crate::diagnostic::{Diagnostic, quoted};
@@ -59,7 +60,7 @@ pub(super) fn unpacked(file: &File<'_>, view: Value<'_>) -> Read<Option<Vec<u8>>
     let Some(packed) = packed else {
         return Err(value.wrong("the buffer of what is needed here has no data").into());
     };
-    super::check_expansion(file, value, "compressed data", length, count as u64 * stride as u64)?;
+    check_expansion(file, value, "compressed data", length, count as u64 * stride as u64)?;
     let mut bytes = file.budget.vec(count as u64 * stride as u64, "decompressed buffer view")?;
     let decoded = match &*mode {
         "ATTRIBUTES" => attributes(packed, count, stride, generation, &mut bytes),

@@ -17,15 +17,17 @@ use lumbre_scene::{
 use super::accessor::{Accessor, Component, Element};
 use super::animation::Playing;
 use super::check::check;
+use super::expansion::check_expansion;
 use super::exposure::Exposure;
 use super::file::{File, List};
 use super::graph::Graph;
 use super::ies::Profiles;
 use super::json::{Read, Value};
 use super::mesh::{self, Assembly, Pose, Primitive, Vertices};
+use super::options::GltfOptions;
 use super::shade::{Dressing, Materials};
 use super::texture::UvSets;
-use super::{GltfOptions, animation, listing, tangents};
+use super::{animation, listing, tangents};
 use crate::diagnostic::{Diagnostic, quoted};
 use crate::thin;
 
@@ -94,7 +96,7 @@ pub(super) fn read(file: &File<'_>, options: &GltfOptions) -> Read<SceneDesc> {
                 let copies = instances(file, extension)?;
                 // A few bytes shared by many nodes are copied for each of them.
                 copied += (copies.len() * size_of::<InstanceDesc>()) as u64;
-                super::check_expansion(file, extension, "copies of meshes", file.buffer_bytes(), copied)?;
+                check_expansion(file, extension, "copies of meshes", file.buffer_bytes(), copied)?;
                 copies
             }
             None => vec![DAffine3::IDENTITY],
@@ -476,7 +478,7 @@ impl Builder<'_> {
             let count = primitive.attributes.position.as_ref().map_or(0, |position| position.count);
             if place.key.owner.is_some() || !place.key.weights.is_empty() {
                 self.bent += (count * size_of::<Vec3>() * (1 + poses.len())) as u64;
-                super::check_expansion(file, value, "vertices that bend", file.buffer_bytes(), self.bent)?;
+                check_expansion(file, value, "vertices that bend", file.buffer_bytes(), self.bent)?;
             }
             let mut vertices = mesh::vertices(file, &primitive, pose, wants)?;
             if primitive.mode.is_surface() {

@@ -13,6 +13,7 @@ use lumbre_shading::{
     SpectrumTexture, Texture, UvSet, Wrap,
 };
 
+use super::extensions::SUPPORTED;
 use super::file::{File, List};
 use super::json::{Read, Value};
 use super::material::TextureRef;
@@ -313,7 +314,7 @@ fn source(file: &File<'_>, value: Value<'_>) -> Read<Option<usize>> {
     for name in ["EXT_texture_webp", "KHR_texture_basisu"] {
         let Some(extension) = value.extension(name)? else { continue };
         if let Some((index, _)) = file.named(List::Images, extension, "source")?
-            && super::SUPPORTED.contains(&name)
+            && SUPPORTED.contains(&name)
         {
             chosen = chosen.or(Some(index));
         }
