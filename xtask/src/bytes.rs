@@ -84,8 +84,8 @@ impl Program {
         Ok(Self { name: name.to_owned(), command, instruction_set: None })
     }
 
-    /// What it writes: to standard output, and to the files that the arguments name in [`FOLDER`]. None where it does not
-    /// have what is asked.
+    /// What it writes: to standard output, and to the files that the arguments name in [`FOLDER`]. None where it does
+    /// not have what is asked.
     fn written(&self, run: &Run) -> Result<Option<Vec<u8>>> {
         let files: Vec<_> = run.outputs.iter().map(|name| root().join(FOLDER).join(name)).collect();
         for file in &files {

@@ -1,5 +1,5 @@
-//! What is handed out: the program for each platform, wheels, a Debian package, one of npm and the book, with the licences of what they are made of,
-//! a list of it, and sums.
+//! What is handed out: the program for each platform, wheels, a Debian package, one of npm and the book, with the
+//! licences of what they are made of, a list of it, and sums.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,8 @@ impl Dist {
     /// Makes what can be made on this machine into `target/dist`, and names the rest with what it lacks.
     ///
     /// # Errors
-    /// When the work tree has changes, when something that was asked for by name cannot be made, and as the tools that it runs.
+    /// When the work tree has changes, when something that was asked for by name cannot be made, and as the tools that
+    /// it runs.
     pub(crate) fn run(self) -> Result<()> {
         ensure!(
             self.allow_dirty || command::output("git", &["status", "--porcelain"])?.is_empty(),
@@ -129,7 +130,8 @@ impl Dist {
     }
 }
 
-/// The manual pages and completions of the program, in folders of these names; by the program that `LUMBRE_PROGRAM` names, if any.
+/// The manual pages and completions of the program, in folders of these names; by the program that `LUMBRE_PROGRAM`
+/// names, if any.
 fn pages() -> Result<PathBuf> {
     let program = match std::env::var_os("LUMBRE_PROGRAM") {
         Some(named) => PathBuf::from(named),

@@ -57,8 +57,9 @@ enum Task {
     /// The same bytes anywhere: hashes of pictures, answers, results and explanations, by instruction sets and
     /// programs.
     Bytes(bytes::Bytes),
-    /// Makes what is handed out into target/dist: the program for each platform, wheels, a Debian package, one of npm, the
-    /// book, a list of what they are made of, and sums. What cannot be made on this machine is named, with what it lacks.
+    /// Makes what is handed out into target/dist: the program for each platform, wheels, a Debian package, one of npm,
+    /// the book, a list of what they are made of, and sums. What cannot be made on this machine is named, with what it
+    /// lacks.
     Dist(dist::Dist),
     /// Lumbre for the browser: makes the npm package and the playground in target/web, and tries both. Says what it
     /// needs where that is missing.

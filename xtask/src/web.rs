@@ -116,7 +116,8 @@ pub(crate) fn package() -> Result<Result<PathBuf, String>> {
     Ok(Ok(out().join("npm")))
 }
 
-/// The part of the test command: the code for WebAssembly compiles where there is a compiler; what is not made and tried is named.
+/// The part of the test command: the code for WebAssembly compiles where there is a compiler; what is not made and
+/// tried is named.
 pub(crate) fn check() -> Result<()> {
     let missing = missing()?;
     if missing.is_empty() && std::env::var_os("LUMBRE_WEB").is_some() {

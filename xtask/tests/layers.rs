@@ -157,7 +157,7 @@ fn folders_use_lower_folders_only() {
 /// shrink.
 const CIRCLES: &[(&str, &[usize])] = &[
     ("lumbre-cli", &[8, 4]),
-    ("lumbre-formats", &[12, 7, 6, 3, 2]),
+    ("lumbre-formats", &[12, 7, 3, 2]),
     ("lumbre-math", &[4]),
     ("lumbre-render", &[3, 3]),
     ("lumbre-scene", &[3, 3, 2, 2, 2]),

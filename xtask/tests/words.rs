@@ -82,18 +82,8 @@ const GONE: &[(Scope, &str, &str)] = &[
     (Scope::Prose, "why boxes lose nothing", "# Error bound"),
 ];
 
-/// Columns of a comment, outside of [`WIDE_FOLDERS`].
+/// Maximum number of columns of a comment.
 const MAX_COLUMNS: usize = 120;
-/// Where comments are still wider.
-const WIDE_FOLDERS: [&str; 7] = [
-    "crates/lumbre-formats/",
-    "crates/lumbre-geometry/src/explain/",
-    "crates/lumbre-render/src/caustics/",
-    "crates/lumbre-scene/src/light/",
-    "crates/lumbre-scene/src/light.rs",
-    "crates/lumbre-web/",
-    "xtask/src/dist",
-];
 /// Characters of a test's name.
 const MAX_TEST_NAME: usize = 60;
 
@@ -130,11 +120,10 @@ fn faults(path: &str, text: &str) -> Vec<String> {
                 found.push(format!("{path}:{number}: instead of \"{phrase}\" say \"{better}\""));
             }
         }
-        let is_wide = WIDE_FOLDERS.iter().any(|folder| path.starts_with(folder));
         // Rows of tables are not wrapped, and addresses cannot be.
         let is_prose =
             is_rust && comment(line).is_some_and(|text| !text.contains(" | ") && !text.contains("://"));
-        if !is_wide && is_prose && line.chars().count() > MAX_COLUMNS {
+        if is_prose && line.chars().count() > MAX_COLUMNS {
             found.push(format!("{path}:{number}: a comment of more than {MAX_COLUMNS} columns"));
         }
         let name = line.trim_start().strip_prefix("fn ").and_then(|rest| rest.split(['(', '<']).next());

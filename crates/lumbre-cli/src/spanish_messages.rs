@@ -412,8 +412,8 @@ pub(crate) fn by_table(table: Table, text: &str) -> Option<String> {
     best(&[table], text).map(|(_, spanish)| spanish)
 }
 
-/// The translation of the entry of these tables that a text fits best, and how many characters that entry has beside its
-/// places.
+/// The translation of the entry of these tables that a text fits best, and how many characters that entry has beside
+/// its places.
 fn best(tables: &[Table], text: &str) -> Option<(usize, String)> {
     let fitting = tables.iter().copied().flatten().filter_map(|&(english, spanish)| {
         let parts = fitted(english, text)?;

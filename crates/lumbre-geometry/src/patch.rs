@@ -533,7 +533,8 @@ impl Sheared {
         size > 0.0 && is_centred(first) && is_centred(last)
     }
 
-    /// Whether the ruling `u` is parallel to the ray, and does not lie on it: seen along the ray, it is a point elsewhere.
+    /// Whether the ruling `u` is parallel to the ray, and does not lie on it: seen along the ray, it is a point
+    /// elsewhere.
     pub(crate) fn is_parallel_to_ruling(&self, u: f64) -> bool {
         let [first, last] = [0.0, 1.0].map(|v| self.at(DVec2::new(u, v)));
         let width = |p: DVec3| p.x.abs().max(p.y.abs());

@@ -23,9 +23,10 @@ pub fn dielectric<R: Real>(cos_i: R, eta: R) -> R {
 /// The reflectance of a metal of index `eta + i k` (over that of its surroundings) at one wavelength, `cos_i` ≥
 /// 0.
 ///
-/// An infinite `k` reflects everything. A negative `eta` stands for a channel that reflects more than all of its light, as
-/// red does of gold, whose colour no three channels hold: `1 - eta` at normal incidence, and 1 at grazing. Source: the Fresnel equations with a complex index, in the real form of
-/// Born and Wolf, "Principles of Optics", 7th ed., 1999, section 14.2.
+/// An infinite `k` reflects everything. A negative `eta` stands for a channel that reflects more than all of its light,
+/// as red does of gold, whose colour no three channels hold: `1 - eta` at normal incidence, and 1 at grazing. Source:
+/// the Fresnel equations with a complex index, in the real form of Born and Wolf, "Principles of Optics", 7th ed.,
+/// 1999, section 14.2.
 #[inline(always)]
 pub fn conductor_channel<R: Real>(cos_i: R, eta: R, k: R) -> R {
     let cos_i = cos_i.simd_max(R::zero()).simd_min(R::one());

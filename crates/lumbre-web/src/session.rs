@@ -154,11 +154,12 @@ impl Session {
         &self.warnings
     }
 
-    /// Renders these rows alone, the first and that beyond the last: so several sessions of the same scene share its picture. What was
-    /// rendered before is given up.
+    /// Renders these rows alone, the first and that beyond the last: so several sessions of the same scene share its
+    /// picture. What was rendered before is given up.
     ///
     /// # Errors
-    /// [`ProblemKind::Usage`] where there are none of these rows, and for a picture that is denoised, which has to be whole.
+    /// [`ProblemKind::Usage`] where there are none of these rows, and for a picture that is denoised, which has to be
+    /// whole.
     pub fn limit_rows(&mut self, from: u32, to: u32) -> Result<(), Problem> {
         if self.options.guides {
             return Err(Problem::new(
@@ -184,7 +185,8 @@ impl Session {
         (self.options.width, self.options.height)
     }
 
-    /// Renders on for about so long, and says how far the picture is. What is rendered is the same however the time is cut into passes.
+    /// Renders on for about so long, and says how far the picture is. What is rendered is the same however the time is
+    /// cut into passes.
     ///
     /// # Errors
     /// Where the options make no picture.
@@ -229,8 +231,8 @@ impl Session {
         })
     }
 
-    /// What is rendered of the picture, as displays show it: red, green, blue in sRGB and alpha of each pixel, row by row from the top,
-    /// as a PNG of the program has them. Empty before the first pass.
+    /// What is rendered of the picture, as displays show it: red, green, blue in sRGB and alpha of each pixel, row by
+    /// row from the top, as a PNG of the program has them. Empty before the first pass.
     pub fn pixels(&self) -> Vec<u8> {
         let Some(picture) = &self.picture else { return Vec::new() };
         let (image, left) = picture.displayed(&self.save);
@@ -245,14 +247,15 @@ impl Session {
         bytes
     }
 
-    /// What is rendered of the picture in linear light: red, green and blue of each pixel, row by row from the top, as a PFM of the
-    /// program has them. Empty before the first pass.
+    /// What is rendered of the picture in linear light: red, green and blue of each pixel, row by row from the top, as
+    /// a PFM of the program has them. Empty before the first pass.
     pub fn light(&self) -> Vec<f32> {
         let Some(picture) = &self.picture else { return Vec::new() };
         picture.light().pixels().iter().flat_map(|light| light.to_array()).collect()
     }
 
-    /// What rays hit, or what is at points: what `lumbre cast` prints. `query` is one of its names, `list` a CSV or a `.npy`.
+    /// What rays hit, or what is at points: what `lumbre cast` prints. `query` is one of its names, `list` a CSV or a
+    /// `.npy`.
     ///
     /// # Errors
     /// With the place in the list.

@@ -509,7 +509,7 @@ fn voxels_with_colours_of_their_own_shine_in_the_units_of_pbrt() {
 }
 
 #[test]
-fn the_illuminance_of_a_square_map_is_twice_what_is_asked_for_as_in_pbrt() {
+fn a_square_map_has_twice_the_illuminance_asked_for_as_in_pbrt() {
     for (width, factor) in [(64, 2.0), (128, 1.0)] {
         let name = "map.pfm";
         let folder = folder_with(&[(name, Image::filled(width, 64, Rgb::splat(0.3)))]);

@@ -1,4 +1,5 @@
-//! What a product is made of: the packages that are compiled into it, with their licences for its users, and as a list for machines.
+//! What a product is made of: the packages that are compiled into it, with their licences for its users, and as a list
+//! for machines.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -37,8 +38,8 @@ struct Package {
 const LICENCES: [&str; 6] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "COPYRIGHT", "UNLICENSE"];
 
 impl Dependencies {
-    /// Those of packages of the workspace on all platforms of programs and wheels, by cargo's own graph, without what only
-    /// tests, builds and macros need.
+    /// Those of packages of the workspace on all platforms of programs and wheels, by cargo's own graph, without what
+    /// only tests, builds and macros need.
     pub(super) fn of(roots: &[&str]) -> Result<Self> {
         Self::on(&TARGETS.iter().map(|target| target.triple).collect::<Vec<_>>(), roots)
     }

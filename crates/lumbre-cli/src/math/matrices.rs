@@ -210,7 +210,7 @@ pub(super) fn inverted(m: &Matrix) -> Option<Matrix> {
 
 /// How the inverse comes from the cofactors.
 pub(super) fn show_inverse(m: &Matrix, inverse: &Matrix, work: &mut Work) {
-    // Products of so many entries are doubles.
+    // Products of this many entries are doubles.
     let power = exponent(m.cells[..m.rows].as_flattened());
     let power = if power.abs() > 200 { power } else { 0 };
     let scaled = Matrix::from_fn(m.rows, m.columns, |i, j| times_power(m.cells[i][j], -power));

@@ -51,7 +51,8 @@ impl Ball {
         self.world_from_ball.normal(away * (-4.0 * self.strength * rest / squared))
     }
 
-    /// The parts of a ray on which the field is a polynomial: from t to t, with the square of the distance by powers of t.
+    /// The parts of a ray on which the field is a polynomial: from t to t, with the square of the distance by powers of
+    /// t.
     fn spans(&self, ray: &Ray, out: &mut Vec<Span>) {
         let o = self.world_from_ball.inverse_point(ray.origin) - self.ends[0];
         let d = self.world_from_ball.inverse_vector(ray.direction);

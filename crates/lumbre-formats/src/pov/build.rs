@@ -436,7 +436,8 @@ impl Builder {
         Some(Boundary { inside: Some(inside), outside: None })
     }
 
-    /// The light that a surface gives to path tracers: its emission, and ambient light where it scatters next to nothing.
+    /// The light that a surface gives to path tracers: its emission, and ambient light where it scatters next to
+    /// nothing.
     fn glow(&self, id: MaterialId) -> Option<AreaLightDesc> {
         let MaterialKind::Pov(material) = &self.scene.materials[id.0 as usize].material.kind else {
             return None;

@@ -170,7 +170,8 @@ impl Parser<'_, '_> {
         Ok(())
     }
 
-    /// Skips to the `#end` of the open block, or to its next `#else`, `#elseif`, `#case` or `#range`, and gives its word.
+    /// Skips to the `#end` of the open block, or to its next `#else`, `#elseif`, `#case` or `#range`, and gives its
+    /// word.
     fn skip(&mut self, stops_at_branches: bool) -> Result<Rc<str>> {
         let mut depth = 0_u32;
         loop {

@@ -115,8 +115,8 @@ impl Heights {
         DVec3::new(-slope.x, 1.0, -slope.y)
     }
 
-    /// The mean of the normals of a node with two of its neighbours, where the height is measured in its levels and the sides in cells: so
-    /// steep that flat parts outweigh steep ones by far. POV-Ray keeps it in 16 bits.
+    /// The mean of the normals of a node with two of its neighbours, where the height is measured in its levels and the
+    /// sides in cells: so steep that flat parts outweigh steep ones by far. POV-Ray keeps it in 16 bits.
     fn node_normal(&self, x: u32, z: u32) -> DVec3 {
         let here = self.height(x, z);
         let steps = |at: u32, count: u32| {
@@ -319,7 +319,8 @@ mod tests {
 
     #[test]
     fn a_smooth_field_has_the_normals_that_povray_prints() {
-        // height_field { function 5,5 {0.5+0.4*sin(7*x+1.3)*cos(5*y+0.4)+0.05*sin(31*x*y)} smooth }, by trace() from above.
+        // height_field { function 5,5 {0.5+0.4*sin(7*x+1.3)*cos(5*y+0.4)+0.05*sin(31*x*y)} smooth }, by trace() from
+        // above.
         let size = [5_u32, 5];
         let mut heights = Vec::new();
         for j in 0..5 {

@@ -342,14 +342,16 @@ impl Parser<'_, '_> {
     }
 }
 
-/// The level of a pixel: numbers as they are stored, where red is the high byte and green the low one of what has colours.
+/// The level of a pixel: numbers as they are stored, where red is the high byte and green the low one of what has
+/// colours.
 fn level(bitmap: &Bitmap, x: u32, y: u32, is_png: bool) -> f32 {
     let stored = bitmap.stored(x, y, 0);
     if !matches!(bitmap.channels(), Channels::Y | Channels::Ya) {
         return (stored * 255.0).rounded() * 256.0 + (bitmap.stored(x, y, 1) * 255.0).rounded();
     }
     if is_png && matches!(bitmap.data(), PixelData::U8(_)) {
-        // POV-Ray weighs the three equal channels of such a pixel in single precision, and drops what is behind the point.
+        // POV-Ray weighs the three equal channels of such a pixel in single precision, and drops what is behind the
+        // point.
         let gray = 255.0 * (0.297_f32 * stored + 0.589_f32 * stored + 0.114_f32 * stored);
         return gray.floor() * 257.0;
     }

@@ -53,8 +53,8 @@ impl Julia {
         p.extend((distance - normal.truncate().dot(p)) / normal.w)
     }
 
-    /// The logarithm of the length after all steps, over that at which it has escaped: negative inside. And the derivative of the
-    /// length by the place, at most.
+    /// The logarithm of the length after all steps, over that at which it has escaped: negative inside. And the
+    /// derivative of the length by the place, at most.
     fn escape(&self, p: DVec3) -> (f64, f64, f64) {
         let mut h = self.place(p);
         let mut slope = 1.0;
@@ -126,8 +126,8 @@ impl Julia {
             }
             was_inside = Some(is_inside);
             before = s;
-            // The distance to the set is estimated by the length and its derivative (Hart, Sandin, Kauffman, "Ray tracing
-            // deterministic 3-D fractals", 1989).
+            // The distance to the set is estimated by the length and its derivative (Hart, Sandin, Kauffman, "Ray
+            // tracing deterministic 3-D fractals", 1989).
             let estimate = if is_inside { 0.0 } else { 0.25 * size * size.logarithm() / slope.max(1e-9) };
             s += estimate.clamp(least, 0.5);
         }

@@ -517,8 +517,8 @@ impl Parser<'_, '_> {
         Ok(Form::Poly(Arc::new(Algebraic::new(degree, terms.into()))))
     }
 
-    /// `object { … }` as a pattern: 1 inside of the object, 0 outside. What it names stands behind the object, before the brace that
-    /// closes it.
+    /// `object { … }` as a pattern: 1 inside of the object, 0 outside. What it names stands behind the object, before
+    /// the brace that closes it.
     pub(super) fn inside_pattern(&mut self) -> Result<PatternKind> {
         self.expect(b'{')?;
         let object = match self.object()? {

@@ -183,7 +183,8 @@ impl Parser<'_, '_> {
                         let amount = self.vector()?;
                         match &mut draft.pattern {
                             Some(pattern) => pattern.turbulence = amount,
-                            // Of what has no pattern of its own, such as an average or an image: a warp that acts first.
+                            // Of what has no pattern of its own, such as an average or an image: a warp that acts
+                            // first.
                             None => {
                                 draft.warps.0.insert(0, Warp::Turbulence { amount, octaves: draft.octaves })
                             }

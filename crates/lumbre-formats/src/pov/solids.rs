@@ -583,7 +583,8 @@ fn power(x: Dual, exponent: f64) -> Dual {
     Dual { value, slope: factor * x.slope }
 }
 
-/// Closed loops of a plane as triangles, by trapezoids between the heights of their corners: inside by the even–odd rule.
+/// Closed loops of a plane as triangles, by trapezoids between the heights of their corners: inside by the even–odd
+/// rule.
 pub(super) fn triangulated(points: &[DVec2]) -> Vec<[DVec2; 3]> {
     // The edge that leads from the end of a loop to the next loop is none.
     let mut closed: Vec<[DVec2; 2]> = Vec::new();

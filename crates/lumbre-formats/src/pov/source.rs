@@ -300,8 +300,8 @@ impl Parser<'_, '_> {
         Ok(is)
     }
 
-    /// Where an operator may come, whether what comes next is a directive that begins another statement. What a value came from, such as
-    /// a macro or a branch of an `#if`, is left first.
+    /// Where an operator may come, whether what comes next is a directive that begins another statement. What a value
+    /// came from, such as a macro or a branch of an `#if`, is left first.
     pub(super) fn ends_here(&mut self) -> Result<bool> {
         while let Some((frames, blocks)) = self.declaring
             && self.peeked.is_none()

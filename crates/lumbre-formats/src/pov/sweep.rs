@@ -3,7 +3,8 @@
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
 use lumbre_math::{DVec2, DVec3, DVec4};
 
-/// A segment of a curve that is no line is approximated by this many round cones; the error is below the square of its inverse.
+/// A segment of a curve that is no line is approximated by this many round cones; the error is below the square of its
+/// inverse.
 const PIECES: u32 = 512;
 /// As near as it begins, few steps are exact.
 const NEWTON_STEPS: u32 = 3;
@@ -140,7 +141,8 @@ impl Sweep {
         let Some(cone) = self.cones.get(root.part as usize) else { return DVec3::Y };
         let cubic = &self.segments[cone.segment as usize];
         let mut u = cone.range[0] + root.local.x * (cone.range[1] - cone.range[0]);
-        // The spheres that touch their envelope at p have no slope of |p − C|² − r²; the round cone gives where that is nearly so.
+        // The spheres that touch their envelope at p have no slope of |p − C|² − r²; the round cone gives where that is
+        // nearly so.
         for _ in 0..NEWTON_STEPS {
             let sphere = at(cubic, u);
             let first = (3.0 * cubic[3] * u + 2.0 * cubic[2]) * u + cubic[1];
@@ -177,7 +179,8 @@ impl RoundCone {
         Aabb { min: (a - r).min(b - s) - margin, max: (a + r).max(b + s) + margin }
     }
 
-    /// The unit axis, the length, and sine and cosine of the slope of its side; nothing where one sphere is inside of the other.
+    /// The unit axis, the length, and sine and cosine of the slope of its side; nothing where one sphere is inside of
+    /// the other.
     fn side(&self) -> Option<(DVec3, f64, f64, f64)> {
         let axis = self.ends[1] - self.ends[0];
         let length = axis.length();

@@ -45,8 +45,8 @@ pub enum Topic {
     /// Where the line passes the planes of a box, axis by axis: those of the lower and higher coordinate.
     Slabs,
     /// The interval of the line within a convex solid: from the last of what it enters to the first of what it leaves.
-    /// Of a capsule, the interval that covers those of its parts: `I₀` within the cylinder between both planes, `I₁` and
-    /// `I₂` within the balls.
+    /// Of a capsule, the interval that covers those of its parts: `I₀` within the cylinder between both planes, `I₁`
+    /// and `I₂` within the balls.
     Span,
     /// The line in a torus' own frame, from the point that is nearest to the centre: `p + s·U`, with a unit `U`. `g` is
     /// the length of the direction, and `s₀` what rounding leaves between `t₀` and that point. `z₀` and `z₁` are the

@@ -42,9 +42,9 @@ impl Merging<'_> {
         self.passes.iter().find(|(number, _)| *number == pass).map(|(_, photons)| &**photons)
     }
 
-    /// The radius of a sample per width of a footprint: it shrinks every [`SAMPLES_A_PASS`] samples, so that the mean of all passes
-    /// converges to the right value (C. Knaus, M. Zwicker, "Progressive Photon Mapping: A Probabilistic Approach",
-    /// 2011, with α = 2/3).
+    /// The radius of a sample per width of a footprint: it shrinks every [`SAMPLES_A_PASS`] samples, so that the mean
+    /// of all passes converges to the right value (C. Knaus, M. Zwicker, "Progressive Photon Mapping: A Probabilistic
+    /// Approach", 2011, with α = 2/3).
     pub(crate) fn widths(sample: u32) -> f32 {
         let pass = f64::from(sample / SAMPLES_A_PASS) + 1.0;
         (WIDTHS * pass.power(-1.0 / 6.0)) as f32

@@ -34,8 +34,8 @@ const KEPT_SAMPLES: u32 = 32;
 pub(crate) struct PassPlan {
     /// The number of pixels across and down.
     size: [u32; 2],
-    /// How paths choose wavelengths; `None` in RGB. The paths of a pass have the same wavelengths, those of the camera and
-    /// those of light. So there is a pass for each sample of a pixel, of fewer lines.
+    /// How paths choose wavelengths; `None` in RGB. The paths of a pass have the same wavelengths, those of the camera
+    /// and those of light. So there is a pass for each sample of a pixel, of fewer lines.
     density: Option<WavelengthDensity>,
 }
 

@@ -211,7 +211,8 @@ impl Elsewhere {
         }
         let light = &lights[self.light as usize];
         let cosine = light.towards(time).map_or(1.0, |towards| normal.dot(towards));
-        // As for lights in the tree: rounding may light a surface in the light's own plane. A disc may be above it in part.
+        // As for lights in the tree: rounding may light a surface in the light's own plane. A disc may be above it in
+        // part.
         let slack = HORIZON_SLACK + light.half_width();
         if cosine < -slack { 0.0 } else { self.power * cosine.max(slack) }
     }

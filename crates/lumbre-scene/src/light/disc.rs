@@ -64,8 +64,8 @@ impl DiscLight {
         if self.holds(direction) { warp64::cone_pdf(self.one_minus_cos) } else { 0.0 }
     }
 
-    /// The irradiance on a surface with the unit `normal`. A disc that the horizon cuts counts as its visible part, as if the
-    /// horizon were straight.
+    /// The irradiance on a surface with the unit `normal`. A disc that the horizon cuts counts as its visible part, as
+    /// if the horizon were straight.
     pub fn irradiance(&self, normal: DVec3) -> Spectrum {
         let height = normal.dot(self.frame.z);
         if height >= self.sine {

@@ -227,7 +227,8 @@ impl LaneLights {
         self.infinite.len()
     }
 
-    /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction from a receiver.
+    /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction from a
+    /// receiver.
     #[inline(always)]
     pub fn background<R: Real>(
         &self,
@@ -239,8 +240,8 @@ impl LaneLights {
         self.elsewhere[self.infinite[position] as usize].escaped(&self.sources, active, receiver, direction).0
     }
 
-    /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction, and the density with which
-    /// [`LaneLights::sample`] with [`Sampling::Mis`] samples that direction for a receiver.
+    /// The radiance of one of the [`LaneLights::infinite_count`] infinite lights along a unit direction, and the
+    /// density with which [`LaneLights::sample`] with [`Sampling::Mis`] samples that direction for a receiver.
     #[inline(always)]
     pub fn escaped<R: Real>(
         &self,

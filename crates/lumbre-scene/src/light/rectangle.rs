@@ -4,8 +4,8 @@ use lumbre_math::{DVec2, DVec3, Elementary, direction_at};
 
 /// A rectangle, up to rounding.
 ///
-/// C. Urena, M. Fajardo, A. King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013. The four angles
-/// are kept as complex numbers here, whose product needs one arc tangent for the solid angle.
+/// C. Urena, M. Fajardo, A. King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013. The four
+/// angles are kept as complex numbers here, whose product needs one arc tangent for the solid angle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rectangle {
     corner: DVec3,

@@ -3,10 +3,11 @@
 //! The sky is that of L. Hosek and A. Wilkie, "An Analytic Model for Full Spectral Sky-Dome Radiance", ACM Transactions
 //! on Graphics 31(4) (SIGGRAPH), 2012: a formula whose coefficients depend on the height of the sun, the turbidity of
 //! the air and the reflectance of the ground. `hosek-wilkie.bin` holds the authors' coefficients for linear Rec. 709,
-//! under the licence in `LICENSE-HOSEK-WILKIE`: single precision, little-endian; for each channel 9 × 6 × 10 × 2 numbers
-//! of the formula, then 6 × 10 × 2 of the radiance, by coefficient, control point, turbidity and reflectance, the first
-//! fastest. The crate `hw-skymodel` has the same coefficients, but its powers are those of the system's library, whose
-//! last bits differ by platform; here they are those of [`Elementary`], so that pictures have the same bytes everywhere.
+//! under the licence in `LICENSE-HOSEK-WILKIE`: single precision, little-endian; for each channel 9 × 6 × 10 × 2
+//! numbers of the formula, then 6 × 10 × 2 of the radiance, by coefficient, control point, turbidity and reflectance,
+//! the first fastest. The crate `hw-skymodel` has the same coefficients, but its powers are those of the system's
+//! library, whose last bits differ by platform; here they are those of [`Elementary`], so that pictures have the same
+//! bytes everywhere.
 //!
 //! Radiance is in units in which a white surface shows 1 where 100,000 lux light it: 1 is a luminance of 31,831 cd/m².
 

@@ -184,8 +184,8 @@ fn interpolate(pairs: &[(f64, f64)], nm: f64) -> f64 {
     }
 }
 
-/// (x̄, ȳ, z̄) at a wavelength in nm within the table: by the cubic through the four nearest entries, as the CIE advises
-/// between its entries. (Linear, a narrow line has a colour that is wrong by half a per cent.)
+/// (x̄, ȳ, z̄) at a wavelength in nm within the table: by the cubic through the four nearest entries, as the CIE
+/// advises between its entries. (Linear, a narrow line has a colour that is wrong by half a per cent.)
 fn matching(nm: f64) -> [f64; 3] {
     let last = MATCHING.len() - 1;
     let place = ((nm - FIRST_NM) / STEP_NM).clamp(0.0, last as f64);

@@ -5,9 +5,9 @@
 //!   dioxide are measurements as it publishes them. Brass (CuZn) is Querry, "Optical Constants", Contractor Report
 //!   CRDC-CR-85034, 1985, of 70 % copper and 30 % zinc. Magnesium oxide is Stephens and Malitson, "Index of Refraction
 //!   of Magnesium Oxide", Journal of Research of the National Bureau of Standards 49(4), 1952; it does not absorb.
-//! - CIE illuminants: CIE 15:2018. D65 and the D60 of ACES follow the daylight formula. `stdillum-D50` is that of pbrt-v4,
-//!   so that its scenes keep their colours: the formula without the negative values of S₁ and S₂, from 400 nm on. It is
-//!   greener than the CIE's D50, (0.3368, 0.3580) in place of (0.3457, 0.3585).
+//! - CIE illuminants: CIE 15:2018. D65 and the D60 of ACES follow the daylight formula. `stdillum-D50` is that of
+//!   pbrt-v4, so that its scenes keep their colours: the formula without the negative values of S₁ and S₂, from 400 nm
+//!   on. It is greener than the CIE's D50, (0.3368, 0.3580) in place of (0.3457, 0.3585).
 
 use super::{fluorescent, interpolate};
 use lumbre_math::Elementary;

@@ -96,7 +96,8 @@ impl LaneElsewhere {
         R::select(place.is_oriented, given, power)
     }
 
-    /// A sample of it, without the probability of its choice. `u` is a point, and further digits of its first coordinate.
+    /// A sample of it, without the probability of its choice. `u` is a point, and further digits of its first
+    /// coordinate.
     #[inline(always)]
     pub(super) fn sample<R: Real>(
         &self,

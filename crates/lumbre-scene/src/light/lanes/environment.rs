@@ -11,7 +11,8 @@ use crate::EnvironmentMapping;
 use crate::light::Sampling;
 use crate::light::environment::{Environment, Panorama};
 
-/// The maps between the world and the space of a light, as columns. Both are up to a factor, since directions are normalized.
+/// The maps between the world and the space of a light, as columns. Both are up to a factor, since directions are
+/// normalized.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LaneMaps {
     light_from_world: [[f32; 3]; 3],
@@ -248,8 +249,8 @@ impl Environment {
         in_light * (stretch * stretch * stretch * R::splat(self.maps.per_determinant))
     }
 
-    /// The radiance from a unit direction of the world, and the density with which [`Environment::lane_sample`] with [`Sampling::Mis`]
-    /// chooses it.
+    /// The radiance from a unit direction of the world, and the density with which [`Environment::lane_sample`] with
+    /// [`Sampling::Mis`] chooses it.
     #[inline(always)]
     pub(super) fn lane_escaped<R: Real>(&self, direction: V3<R>) -> (V3<R>, R) {
         let local = times(&self.maps.light_from_world, direction).normalize();

@@ -9,7 +9,8 @@ use super::table::{Rows, Table, piece};
 
 /// From this many radii away, sampling by area is as good as by solid angle, and faster.
 const FAR_SQUARED: f32 = 4.0;
-/// Solid angles of rectangles below this are sampled by area: they lose the digits of the angles that they are the difference of.
+/// Solid angles of rectangles below this are sampled by area: they lose the digits of the angles that they are the
+/// difference of.
 const MIN_OF_RECTANGLE: f32 = 2e-3;
 /// The same of triangles.
 const MIN_OF_TRIANGLE: f32 = 5e-3;
@@ -194,8 +195,8 @@ pub(super) fn pdf<R: Real>(
 
 /// A rectangle as it is seen from a place, in units of its longer side.
 ///
-/// C. Urena, M. Fajardo, A. King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013. The four angles are kept as
-/// complex numbers, whose product needs one arc tangent for the solid angle.
+/// C. Urena, M. Fajardo, A. King, "An Area-Preserving Parametrization for Spherical Rectangles", EGSR 2013. The four
+/// angles are kept as complex numbers, whose product needs one arc tangent for the solid angle.
 struct SeenRectangle<R: Real> {
     least: [R; 2],
     greatest: [R; 2],
@@ -276,9 +277,9 @@ impl<R: Real> SeenRectangle<R> {
 
 /// A triangle as it is seen from a place.
 ///
-/// J. Arvo, "Stratified sampling of spherical triangles", SIGGRAPH 1995; the solid angle after A. van Oosterom, J. Strackee, "The solid
-/// angle of a plane triangle", IEEE Transactions on Biomedical Engineering, 1983. Sines and cosines of the first corner's angle come from
-/// vector products, so that no angle is computed.
+/// J. Arvo, "Stratified sampling of spherical triangles", SIGGRAPH 1995; the solid angle after A. van Oosterom, J.
+/// Strackee, "The solid angle of a plane triangle", IEEE Transactions on Biomedical Engineering, 1983. Sines and
+/// cosines of the first corner's angle come from vector products, so that no angle is computed.
 struct SeenTriangle<R: Real> {
     /// The unit ways to the corners.
     corners: [V3<R>; 3],
@@ -326,8 +327,8 @@ impl<R: Real> SeenTriangle<R> {
     fn sample(&self, piece: &LanePiece<R>, u: [R; 2]) -> [R; 2] {
         let [a, b, c] = self.corners;
         let (zero, one) = (R::zero(), R::one());
-        // A smaller triangle with the same first corner, whose area is the fraction u[0] of the whole. φ is the angle of that area, less
-        // that of the corner, and half a turn.
+        // A smaller triangle with the same first corner, whose area is the fraction u[0] of the whole. φ is the angle
+        // of that area, less that of the corner, and half a turn.
         let (sin, cos) = math::sin_cos_turns(u[0] * self.solid_angle * R::splat(1.0 / TAU));
         let cos_phi = -(cos * self.cosine + sin * self.sine);
         let sin_phi = -(sin * self.cosine - cos * self.sine);

@@ -19,7 +19,8 @@ pub(super) mod kind {
     pub(crate) const SCALAR: u32 = 2;
 }
 
-/// Numbers of a node. (Packed into seven words they save a sample among 10,000 lamps an eighth of its time, and cost scalar code a third.)
+/// Numbers of a node. (Packed into seven words they save a sample among 10,000 lamps an eighth of its time, and cost
+/// scalar code a third.)
 pub(super) mod node {
     pub(crate) const CENTER: u32 = 0;
     pub(crate) const HALF: u32 = 3;
@@ -77,7 +78,8 @@ pub(super) struct Table {
     pub pieces: Vec<f32>,
     /// The first corner or the position, by emitter.
     pub corners: Vec<f64>,
-    /// Of each entry, where its emitters begin, and how many there are for a primitive: 1, or 0 where all primitives share one.
+    /// Of each entry, where its emitters begin, and how many there are for a primitive: 1, or 0 where all primitives
+    /// share one.
     first: Vec<u32>,
     stride: Vec<u32>,
     emitter_of: Vec<u32>,
@@ -91,7 +93,8 @@ pub(super) struct Rows<'t, R: Real> {
     one: Option<usize>,
 }
 
-/// What differences of single precision, and the rounding of what they are of, may be off by, relative to the greatest coordinate.
+/// What differences of single precision, and the rounding of what they are of, may be off by, relative to the greatest
+/// coordinate.
 pub(super) const ROUNDING: f32 = 2.4e-7;
 
 impl Table {
