@@ -593,7 +593,7 @@ fn options(
     options.integrator.max_depth = arguments.max_depth.unwrap_or(options.integrator.max_depth);
     options.sampler.seed = arguments.seed.unwrap_or(options.sampler.seed);
     let usual = match is_denoised {
-        true => options.stop.clone(),
+        true => options.stop,
         false => Stop::usual(options.integrator.kind, scene.resolved().sampler().spp),
     };
     let spp = match arguments.spp {

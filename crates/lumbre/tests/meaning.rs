@@ -281,9 +281,10 @@ fn illuminance_is_that_of_the_upper_half_on_the_ground() {
         ("wide.exr", painted(128, 64, bright_spot)),
         ("square.exr", painted(64, 64, |u, v| if (u - 0.4).abs() < 0.1 && v < 0.6 { WHITE } else { GREY })),
     ]);
-    for file in ["wide.exr", "square.exr"] {
+    // pbrt-v4 makes a square map twice as bright.
+    for (file, lux) in [("wide.exr", 70.0), ("square.exr", 140.0)] {
         let sky = format!(r#"LightSource "infinite" "string filename" "{file}" "float illuminance" 70"#);
-        assert_near(floor(Some(folder.path()), &sky), grey(70.0), 4e-3, file);
+        assert_near(floor(Some(folder.path()), &sky), grey(lux), 4e-3, file);
     }
 }
 

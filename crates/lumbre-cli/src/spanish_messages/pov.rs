@@ -137,6 +137,10 @@ pub(super) const POV: &[(&str, &str)] = &[
     ("the gamma of an image is that of its file", "la gamma de una imagen es la de su archivo"),
     ("{} has no meaning for an image", "{=} no significa nada en una imagen"),
     ("an image that is not there", "una imagen que no existe"),
+    (
+        "an image without a palette has no single colours that could be transparent",
+        "una imagen sin paleta no tiene colores sueltos que puedan ser transparentes",
+    ),
     ("an image that cannot be read is black", "una imagen que no se puede leer es negra"),
     ("a function in braces", "una función entre llaves"),
     ("a box or a sphere", "una caja o una esfera"),

@@ -147,6 +147,14 @@ pub(super) const SCENES: &[(&str, &str)] = &[
     ("a medium that emits needs \"rgb sigma_a\", too", "un medio que emite necesita también \"rgb sigma_a\""),
     ("\"string filename\" with a NanoVDB file", "\"string filename\" con un archivo NanoVDB"),
     ("the file has no grid {}", "el archivo no tiene la rejilla {}"),
+    (
+        "the file has no grid {}: the medium does not glow",
+        "el archivo no tiene la rejilla {}: el medio no emite luz",
+    ),
+    (
+        "hair on a shape that is no curve: its v says where light meets a fibre",
+        "pelo en una forma que no es una curva: su v dice dónde llega la luz a una fibra",
+    ),
     ("a file with grids", "un archivo con rejillas"),
     ("p0 and p1 that differ on every axis", "p0 y p1 distintos en cada eje"),
     ("a number for each voxel", "un número para cada vóxel"),

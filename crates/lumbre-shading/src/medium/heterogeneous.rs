@@ -109,6 +109,10 @@ pub enum Factor {
 }
 
 impl Factor {
+    fn is_zero(&self) -> bool {
+        matches!(self, Self::Constant(factor) if *factor == 0.0)
+    }
+
     fn at(&self, within: DVec3) -> f32 {
         match self {
             Self::Constant(factor) => *factor,
@@ -209,7 +213,12 @@ impl HeterogeneousMedium {
     }
 
     pub(super) fn glows(&self) -> bool {
-        !matches!(self.glow, Glow::None)
+        match &self.glow {
+            Glow::None => false,
+            Glow::Scaled { radiance, factor } => !radiance.is_black() && !factor.is_zero(),
+            Glow::Coloured { scale, .. } => *scale > 0.0,
+            Glow::Heat(heat) => !heat.factor.is_zero(),
+        }
     }
 
     pub(super) fn memory(&self) -> usize {
