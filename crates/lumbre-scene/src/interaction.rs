@@ -83,7 +83,7 @@ impl<'s> Interaction<'s> {
     }
 
     /// The ray that leaves along a unit direction from another origin, such as
-    /// [`Scene::unoccluded_terminator_origin`].
+    /// [`crate::Scene::unoccluded_terminator_origin`].
     pub fn leave_from(&self, start: DVec3, direction: DVec3) -> Ray {
         Ray::new(start, direction).at_time(self.time)
     }

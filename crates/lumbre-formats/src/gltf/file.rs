@@ -117,7 +117,7 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> File<'a> {
-    /// A file that is not loaded yet: see [`super::load`].
+    /// A file that is not loaded yet: see [`super::load()`].
     pub(super) fn new(
         root: Value<'a>,
         name: &Arc<str>,

@@ -24,7 +24,7 @@ pub struct LaneLightSample<R: Real> {
     pub delta: R::Mask,
     /// Whether any light arrives.
     pub valid: R::Mask,
-    /// The sampled light: see [`LaneLights::light_of`].
+    /// The sampled light: see [`super::LaneLights::light_of`].
     pub source: R::UInt,
 }
 
