@@ -193,3 +193,19 @@ fn a_scene_becomes_shapes_lights_and_a_camera() {
     assert_eq!(diagnostics.warnings(), 1, "{:?}", diagnostics.lines());
     assert!(diagnostics.lines()[0].contains("text"), "{:?}", diagnostics.lines());
 }
+
+#[test]
+fn focal_blur_has_the_samples_of_its_camera() {
+    let samples = |camera: &str| read(&format!("camera {{ {camera} }}")).0.unwrap().sampler.spp;
+    assert_eq!(samples("location <0, 0, -5> look_at 0"), None);
+    assert_eq!(samples("location <0, 0, -5> look_at 0 blur_samples 100"), None);
+    assert_eq!(
+        samples("location <0, 0, -5> look_at 0 aperture 0.4 focal_point 0 blur_samples 100"),
+        Some(100)
+    );
+    assert_eq!(
+        samples("location <0, 0, -5> look_at 0 aperture 0.4 focal_point 0 blur_samples 4, 200"),
+        Some(200)
+    );
+    assert_eq!(samples("location <0, 0, -5> look_at 0 aperture 0.4 focal_point 0"), Some(64));
+}

@@ -38,6 +38,9 @@ struct Key {
     global: bool,
 }
 
+/// Minimum number of samples per pixel with a lens, whose blur is noise otherwise.
+const MIN_BLUR_SAMPLES: u32 = 64;
+
 /// A description that is being made.
 struct Builder {
     scene: SceneDesc,
@@ -96,7 +99,12 @@ impl Parser<'_, '_> {
         let mut scene = builder.scene;
         self.around(&mut scene, gamma, camera.location, builder.around_eye);
         match camera.camera() {
-            Some(made) => scene.cameras.push(made),
+            Some(made) => {
+                if camera.has_lens() {
+                    scene.sampler.spp = Some(camera.blur_samples.max(MIN_BLUR_SAMPLES));
+                }
+                scene.cameras.push(made);
+            }
             None => return Err(Diagnostic::error("the axes of the camera lie in a plane").into()),
         }
         let (width, height) = (self.options.width, self.options.height);

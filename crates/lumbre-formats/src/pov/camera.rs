@@ -24,6 +24,8 @@ pub(super) struct CameraStatement {
     pub height_angle: Option<f64>,
     pub aperture: f64,
     pub focal_point: Option<DVec3>,
+    /// Rays through the lens for each pixel.
+    pub blur_samples: u32,
     /// Whether the scene gives its frame.
     pub has_frame: bool,
 }
@@ -53,6 +55,7 @@ impl CameraStatement {
         height_angle: None,
         aperture: 0.0,
         focal_point: None,
+        blur_samples: 0,
         has_frame: false,
     };
 
@@ -102,6 +105,11 @@ impl CameraStatement {
         self.focal_point = self.focal_point.map(|p| map.point(p));
     }
 
+    /// Whether it has a lens, in which points out of focus blur.
+    pub(super) fn has_lens(&self) -> bool {
+        self.aperture > 0.0 && self.focal_point.is_some()
+    }
+
     /// The camera of the scene; `None` if its axes lie in a plane.
     pub(super) fn camera(&self) -> Option<Camera> {
         let (right, up, direction) = (self.right, self.up, self.direction);
@@ -121,8 +129,7 @@ impl CameraStatement {
         };
         let map = Transform::from_affine(DAffine3 { matrix3: axes, translation: self.location }).ok()?;
         let focal_distance = self.focal_point.map_or(1.0, |p| map.inverse_point(p).z);
-        let has_lens = self.aperture > 0.0 && self.focal_point.is_some() && focal_distance > 0.0;
-        let lens_radius = if has_lens { 0.5 * self.aperture } else { 0.0 };
+        let lens_radius = if self.has_lens() && focal_distance > 0.0 { 0.5 * self.aperture } else { 0.0 };
         if let Some(wide) = self.wide(lengths) {
             let mapping = SphericalMapping::Wide(wide);
             return Some(Camera::new(CameraKind::Spherical { mapping }, map));
@@ -220,10 +227,12 @@ impl Parser<'_, '_> {
                 "aperture" => camera.aperture = self.finite()?,
                 "focal_point" => camera.focal_point = Some(self.vector()?),
                 "blur_samples" => {
-                    self.float()?;
+                    // The first of two is the smaller number, with which POV-Ray starts.
+                    let mut samples = self.finite()?;
                     if self.take(b',')? {
-                        self.float()?;
+                        samples = samples.max(self.finite()?);
                     }
+                    camera.blur_samples = samples.clamp(0.0, 65_536.0) as u32;
                 }
                 "confidence" | "variance" => {
                     self.float()?;
