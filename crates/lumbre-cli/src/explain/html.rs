@@ -1,4 +1,4 @@
-//! What is told, as one page of HTML: formulas as MathML, figures as SVG, and a script that adds a slider and steps.
+//! An explanation as one page of HTML: formulas as MathML, figures as SVG, and a script that adds a slider and steps.
 //! Nothing is loaded from anywhere, and without the script nothing is missing but these two.
 
 use std::collections::BTreeSet;
