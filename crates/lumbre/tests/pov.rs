@@ -243,6 +243,14 @@ fn colours_are_those_of_povray() {
                 finish { ambient 0 diffuse 1 irid { 0.5 thickness 0.05 turbulence 0.5 } } }";
     let declared = "#declare T = texture { pigment { rgb <1,0.5,0.25> } finish { ambient 0.5 diffuse 0 } }";
     let textured = |texture: &str| format!("{declared} plane {{ -z, 0 {texture} }}");
+    // The map that shows v, on a ball that is seen where v is 0.5 + 40 / 180.
+    let ball = |object: &str, texture: &str, after: &str| {
+        let map = "pigment { gradient y color_map { [0 rgb 0] [1 rgb 1] } } finish { ambient 1 diffuse 0 }";
+        format!("sphere {{ 0, 0.6 {object} texture {{ {texture} {map} {after} }} rotate -40*x }}")
+    };
+    let cube = |clips: &str| {
+        format!("{behind} box {{ -0.5, 0.5 pigment {{ rgb <1,0,0> }} finish {{ ambient 1 diffuse 0 }} {clips} }}")
+    };
     let oblique = "light_source { <0,1732.05,-1000> rgb 1 }";
     for (version, scene, expected) in [
         // Layers of a sky are blended by another rule before 3.7.
@@ -275,6 +283,13 @@ fn colours_are_those_of_povray() {
         (3.7, textured("texture { T pigment { quick_color rgb 1 } }"), [0.5, 0.25, 0.125]),
         (3.7, textured("texture { T } finish { phong 0.2 }"), [0.5, 0.25, 0.125]),
         (3.7, textured("texture { T finish { ambient 1 } }"), [1.0, 0.5, 0.25]),
+        // What is in the coordinates of a surface stays on it, whichever of object and texture says so.
+        (3.7, ball("uv_mapping", "", ""), [0.7222; 3]),
+        (3.7, ball("", "uv_mapping", ""), [0.7222; 3]),
+        (3.7, ball("", "uv_mapping", "scale 2"), [0.3611; 3]),
+        // An object may be clipped by its bounds, which else cut nothing.
+        (3.7, cube("bounded_by { sphere { 0.2, 0.4 } } clipped_by { bounded_by }"), [1.0; 3]),
+        (3.7, cube("clipped_by { sphere { 0.2, 0.4 } } bounded_by { clipped_by }"), [1.0; 3]),
         // Blocks that are not given are black beside pigments.
         (3.7, textured("texture { T } pigment { checker pigment { rgb 1 } translate 0.5*(x+y) }"), [0.5; 3]),
         (

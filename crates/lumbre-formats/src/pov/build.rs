@@ -323,7 +323,7 @@ impl Builder {
         let any = |of: &dyn Fn(&Object) -> bool| chain.iter().any(|(object, _)| of(object));
         let uses_uv = any(&|object| object.uv_mapping);
         let placed = |texture: &Arc<Texture>, map: &Transform| {
-            if uses_uv || map.is_identity() { Arc::clone(texture) } else { texture.moved(&Arc::new(*map)) }
+            if uses_uv || map.is_identity() { Arc::clone(texture) } else { texture.carried(&Arc::new(*map)) }
         };
         let from = |of: &dyn Fn(&Object) -> Option<Arc<Texture>>| {
             chain.iter().rev().find_map(|(object, map)| Some(placed(&of(object)?, map)))

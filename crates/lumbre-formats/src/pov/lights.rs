@@ -124,7 +124,7 @@ impl Parser<'_, '_> {
                 let mut object = object;
                 object.transform = Transform::translate(light.from) * object.transform;
                 let shift = Arc::new(Transform::translate(light.from));
-                object.texture = object.texture.map(|texture| texture.moved(&shift));
+                object.texture = object.texture.map(|texture| texture.carried(&shift));
                 object.visibility.no_shadow = true;
                 statement.looks_like = Some(Box::new(object));
             }

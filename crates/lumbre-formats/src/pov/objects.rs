@@ -31,6 +31,8 @@ pub(super) struct Object {
     pub inverse: bool,
     /// What it is cut off by, each in the object's own space before its transforms.
     pub clipped_by: Vec<Rc<Object>>,
+    /// What bounds it: it is cut by them where `clipped_by` names them.
+    pub bounded_by: Vec<Rc<Object>>,
 }
 
 /// What an object is.
@@ -96,6 +98,7 @@ impl Object {
             uv_mapping: false,
             inverse: false,
             clipped_by: Vec::new(),
+            bounded_by: Vec::new(),
         }
     }
 
@@ -103,8 +106,8 @@ impl Object {
         self.transform = **map * self.transform;
         // Textures in the coordinates of a surface stay on it.
         if !self.uv_mapping {
-            self.texture = self.texture.take().map(|texture| texture.moved(map));
-            self.interior_texture = self.interior_texture.take().map(|texture| texture.moved(map));
+            self.texture = self.texture.take().map(|texture| texture.carried(map));
+            self.interior_texture = self.interior_texture.take().map(|texture| texture.carried(map));
         }
         self.interior = self.interior.take().map(|interior| moved_interior(interior, map));
         if let Form::Light(light) = &self.form {
@@ -419,9 +422,10 @@ impl Parser<'_, '_> {
                 }
                 "interior" => object.interior = Some(self.interior_block()?),
                 "clipped_by" => self.clipped_by(object)?,
+                // A hint, unless the object is clipped by it.
                 "bounded_by" => {
-                    self.expect(b'{')?;
-                    self.skip_to(b'}')?;
+                    let bounds = self.clips(object)?;
+                    object.bounded_by.extend(bounds);
                 }
                 "inverse" => object.inverse = !object.inverse,
                 "hollow" => object.hollow = self.optional_bool()?,
@@ -472,17 +476,34 @@ impl Parser<'_, '_> {
     }
 
     fn clipped_by(&mut self, object: &mut Object) -> Result<()> {
+        let clips = self.clips(object)?;
+        object.clipped_by.extend(clips);
+        Ok(())
+    }
+
+    /// The objects in the braces of `clipped_by` or `bounded_by`, of which either may name the other.
+    fn clips(&mut self, object: &Object) -> Result<Vec<Rc<Object>>> {
         self.expect(b'{')?;
-        if self.take_word("bounded_by")? {
-            return self.expect(b'}');
-        }
-        for part in self.parts()? {
-            // In the object's own space, so that later transforms move both.
-            let mut part = (*part).clone();
-            part.transform = object.transform.inverse() * part.transform;
-            object.clipped_by.push(Rc::new(part));
-        }
-        self.expect(b'}')
+        let named = if self.take_word("bounded_by")? {
+            Some(object.bounded_by.clone())
+        } else if self.take_word("clipped_by")? {
+            Some(object.clipped_by.clone())
+        } else {
+            None
+        };
+        let clips = match named {
+            Some(named) => named,
+            None => {
+                // In the object's own space, so that later transforms move both.
+                let inverse = object.transform.inverse();
+                let moved = |part: Rc<Object>| {
+                    Rc::new(Object { transform: inverse * part.transform, ..(*part).clone() })
+                };
+                self.parts()?.into_iter().map(moved).collect()
+            }
+        };
+        self.expect(b'}')?;
+        Ok(clips)
     }
 
     fn quadric(&mut self) -> Result<Form> {

@@ -145,6 +145,19 @@ impl Texture {
         out.push(LayerAt { colour: layer.pigment.colour(q, &eye), normal: tilted, finish: &layer.finish });
     }
 
+    /// Moves the texture with its object. What is in the coordinates of a surface stays on it.
+    #[must_use]
+    pub fn carried(self: &Arc<Self>, map: &Arc<Transform>) -> Arc<Self> {
+        match &self.kind {
+            _ if self.uv => Arc::clone(self),
+            TextureKind::Layers(textures) => {
+                let kind = TextureKind::Layers(textures.iter().map(|texture| texture.carried(map)).collect());
+                Arc::new(Self { kind, ..(**self).clone() })
+            }
+            _ => self.moved(map),
+        }
+    }
+
     /// Moves the texture.
     #[must_use]
     pub fn moved(self: &Arc<Self>, map: &Arc<Transform>) -> Arc<Self> {
