@@ -9,6 +9,7 @@
 use std::cell::RefCell;
 use std::time::Duration;
 
+use lumbre::PixelBounds;
 use lumbre::formats::HeldFiles;
 use serde::de::DeserializeOwned;
 use wasm_bindgen::prelude::*;
@@ -67,6 +68,12 @@ impl Scene {
     #[wasm_bindgen(getter)]
     pub fn height(&self) -> u32 {
         self.0.size().1
+    }
+
+    #[wasm_bindgen(getter)]
+    pub fn bounds(&self) -> Vec<u32> {
+        let PixelBounds { x0, y0, x1, y1 } = self.0.bounds();
+        vec![x0, y0, x1, y1]
     }
 
     #[wasm_bindgen(getter)]

@@ -89,6 +89,8 @@ pub struct Session {
     things: SceneNames,
     name: PathBuf,
     options: RenderOptions,
+    /// The part of the picture that is rendered, if no rows are chosen.
+    bounds: PixelBounds,
     prepared: Prepared,
     save: SaveOptions,
     warnings: Vec<String>,
@@ -138,7 +140,7 @@ impl Session {
             return Err(Problem::new(ProblemKind::Limit, what));
         }
         // Refused here, and not by the first pass.
-        options.bounds().map_err(lumbre::Error::from)?;
+        let bounds = options.bounds().map_err(lumbre::Error::from)?;
         let mut save = prepared.save_options(&scene);
         save.exposure = prepared.exposure(&scene, &options)?;
         let mut warnings = diagnostics.lines();
@@ -146,7 +148,7 @@ impl Session {
             let dark = "the scene has no light: its picture is black";
             warnings.push(format!("warning: {}: {dark}", name.display()));
         }
-        Ok(Self { scene, things, name, options, prepared, save, warnings, state: None, picture: None })
+        Ok(Self { scene, things, name, options, bounds, prepared, save, warnings, state: None, picture: None })
     }
 
     /// What reading and building warned of, a line each.
@@ -169,7 +171,7 @@ impl Session {
         }
         let mut options = self.options.clone();
         let rows = PixelBounds { x0: 0, y0: from, x1: options.width, y1: to };
-        options.crop = Some(options.crop.map_or(rows, |crop| crop.intersection(&rows)));
+        options.crop = Some(self.bounds.intersection(&rows));
         options.bounds().map_err(lumbre::Error::from)?;
         (self.options, self.state, self.picture) = (options, None, None);
         Ok(())
@@ -178,6 +180,11 @@ impl Session {
     /// Whether its rows may be rendered apart.
     pub fn is_divisible(&self) -> bool {
         !self.options.guides
+    }
+
+    /// The part of the picture that is rendered, if no rows are chosen.
+    pub fn bounds(&self) -> PixelBounds {
+        self.bounds
     }
 
     /// Width and height of the whole picture in pixels.

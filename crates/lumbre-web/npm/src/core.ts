@@ -62,6 +62,8 @@ export class Scene {
   readonly width: number;
   /** Height of the picture in pixels. */
   readonly height: number;
+  /** What is rendered of it, if no rows are chosen: the first column and row, and those beyond the last. */
+  readonly bounds: [number, number, number, number];
   /** What reading warned of, a line each. */
   readonly warnings: string[];
 
@@ -71,6 +73,7 @@ export class Scene {
     this.#inner = inner;
     this.width = inner.width;
     this.height = inner.height;
+    this.bounds = [...inner.bounds] as [number, number, number, number];
     this.warnings = inner.warnings;
   }
 

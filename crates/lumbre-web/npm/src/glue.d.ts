@@ -4,6 +4,7 @@ declare module "lumbre-glue" {
   export interface Scene {
     readonly width: number;
     readonly height: number;
+    readonly bounds: Uint32Array;
     readonly warnings: string[];
     readonly isDivisible: boolean;
     limitRows(from: number, to: number): void;

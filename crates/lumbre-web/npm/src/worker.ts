@@ -1,6 +1,6 @@
 // Lumbre on a thread of its own: it renders in short steps, and listens between them.
 import { Lumbre, type Scene } from "./core.js";
-import type { FromWorker, ToWorker } from "./protocol.js";
+import type { FromWorker, Share, ToWorker } from "./protocol.js";
 import { LumbreError, type Problem, type SceneFiles, type Wanted } from "./types.js";
 
 /** Milliseconds of the first step, and of the longest. */
@@ -12,8 +12,8 @@ const say = (message: FromWorker, moved: Transferable[] = []) =>
 
 let lumbre: Promise<Lumbre> | undefined;
 let scene: Scene | undefined;
-/** The scene whose picture is rendered, by the message that opened it. */
-let rendered = 0;
+/** How many pictures were begun or stopped: only the last is rendered. */
+let turn = 0;
 /** The scene that was asked last without being rendered, and what it was opened from. */
 let asked: { files: SceneFiles; name: string; wanted: string; scene: Scene } | undefined;
 
@@ -51,11 +51,22 @@ function pause(): Promise<void> {
   });
 }
 
-async function render(id: number, of: Scene) {
-  rendered = id;
+/** The rows of a share: bands of the same height, none of them empty. */
+function rows({ bounds: [, from, , to] }: Scene, { index, of }: Share): [number, number] {
+  const shares = Math.min(of, to - from);
+  const at = (i: number) => from + Math.floor(((to - from) * i) / shares);
+  return [at(index), at(index + 1)];
+}
+
+/** Renders a picture, or a share of it. The first worker shows all of it, coarse, before it turns to its share. */
+async function render(id: number, of: Scene, share: Share) {
+  const mine = ++turn;
+  const isShared = share.of > 1 && of.isDivisible;
   let time = FIRST;
   try {
-    while (rendered === id && scene === of) {
+    if (isShared && share.index > 0) of.limitRows(...rows(of, share));
+    for (let i = 0; turn === mine; i++) {
+      if (isShared && share.index === 0 && i === 1) of.limitRows(...rows(of, share));
       const pass = of.step(time);
       const pixels = of.pixels().buffer as ArrayBuffer;
       say({ type: "pass", id, pass, pixels }, [pixels]);
@@ -76,7 +87,7 @@ self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
     return;
   }
   if (data.type === "stop") {
-    rendered = 0;
+    turn++;
     return;
   }
   const { id } = data;
@@ -88,9 +99,14 @@ self.onmessage = async ({ data }: MessageEvent<ToWorker>) => {
         const opened = ready.open(data.files, data.name, data.wanted);
         scene?.close();
         scene = opened;
-        const { width, height, warnings } = opened;
-        say({ type: "opened", id, width, height, warnings });
-        void render(id, opened);
+        const { width, height, bounds, warnings, isDivisible } = opened;
+        say({ type: "opened", id, width, height, bounds, warnings, isDivisible });
+        void render(id, opened, data.share);
+        return;
+      }
+      case "alone": {
+        scene?.limitRows(scene.bounds[1], scene.bounds[3]);
+        if (scene) void render(id, scene, { index: 0, of: 1 });
         return;
       }
       case "look": {

@@ -2,10 +2,11 @@
 // screenshots are left there.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath, pathToFileURL } from "node:url";
+import { PNG } from "pngjs";
 import { all, asked, finds, site } from "./site.mjs";
 
 const here = dirname(fileURLToPath(import.meta.url));
@@ -58,6 +59,23 @@ function native(text, ...words) {
   writeFileSync(path, text);
   return execFileSync(program, ["explain", path, ...words], { encoding: "utf8", stdio: ["ignore", "pipe", "ignore"] });
 }
+/** The pixels of the program. */
+function picture(text) {
+  const [path, out] = [join(temporary, "picture.pbrt"), join(temporary, "picture.png")];
+  writeFileSync(path, text);
+  execFileSync(program, ["render", path, "-q", "-o", out]);
+  const { width, height, data } = PNG.sync.read(readFileSync(out));
+  return [width, height, ...data];
+}
+/** In a page: says that the machine has so many threads, counts workers, and makes one of them of a script that fails. */
+function workers({ threads, broken }) {
+  Object.defineProperty(navigator, "hardwareConcurrency", { value: threads });
+  const Own = Worker;
+  window.made = 0;
+  window.Worker = function (url) {
+    return new Own(++window.made === broken ? "data:text/javascript,throw new Error('broken')" : url);
+  };
+}
 const shot = async (page, name) => pictures && page.screenshot({ path: join(pictures, `${name}.png`) });
 
 const tests = {
@@ -85,6 +103,20 @@ const tests = {
     assert.equal(await explained(page, 24, 15), native(changed, "--pixel", "24,15", "--size", "48x32", "--format", "json"));
     assert.match(await page.textContent("#command code"), /--size 48x32/);
     await page.context().close();
+  },
+
+  async "several workers make the picture of the program, and the first alone if another fails"() {
+    // Five workers, some of which have fewer rows; then a second one that cannot start; then more workers than rows.
+    const rows = SCENE.replace('"integer yresolution" 64', '"integer yresolution" 3');
+    for (const [threads, broken, text] of [[5, 0, SCENE], [3, 2, SCENE], [8, 0, rows]]) {
+      const page = await open(address, { script: [workers, { threads, broken }] });
+      await edit(page, text);
+      await finished(page);
+      assert.deepEqual(await pixels(page), picture(text), `${threads} workers`);
+      const made = await page.evaluate(() => made);
+      assert.ok(made >= Math.min(threads, 3), `${made} workers were made`);
+      await page.context().close();
+    }
   },
 
   async "an error has its place and keeps the last picture"() {

@@ -27,9 +27,11 @@ export async function site(folder) {
   return {
     address,
     wrong,
-    async open(url, settings = {}) {
+    /** `script` is a function with its argument, for the page to run first. */
+    async open(url, { script, ...settings } = {}) {
       const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...settings });
       const page = await context.newPage();
+      if (script) await page.addInitScript(...script);
       page.setDefaultTimeout(WAIT);
       page.on("pageerror", (error) => wrong.push(error.message));
       page.on("request", (request) => {
