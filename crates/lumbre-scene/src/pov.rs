@@ -138,6 +138,10 @@ impl PovLight {
             let edge = 1.0 - cone.radius / cone.falloff;
             return x.power(cone.tightness) * smooth_step(x, 0.0, edge);
         }
+        // Parallel rays all go along the axis of the cone.
+        if self.is_parallel {
+            return 1.0;
+        }
         let length = (p - from).length();
         let cosine = if length > 0.0 { along / length } else { 0.0 };
         if cosine <= 0.0 {

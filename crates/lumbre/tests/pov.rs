@@ -251,6 +251,16 @@ fn colours_are_those_of_povray() {
     let cube = |clips: &str| {
         format!("{behind} box {{ -0.5, 0.5 pigment {{ rgb <1,0,0> }} finish {{ ambient 1 diffuse 0 }} {clips} }}")
     };
+    let beam = "light_source { <0,0,-3> rgb 1 spotlight point_at <0,0,0> radius 10 falloff 25 translate x";
+    let white = "plane { -z, 0 pigment { rgb 0.5 } finish { ambient 0 diffuse 1 } }";
+    let thin = |behind: &str, reflection: &str| {
+        format!(
+            "background {{ rgb {behind} }} light_source {{ <0,0,-1000> rgb 1 }} plane {{ -z, 0 pigment {{ rgb 0.5 }} \
+             finish {{ ambient 0 diffuse 0.5 reflection {reflection} irid {{ 0.5 thickness 0.3 }} }} }}"
+        )
+    };
+    let turned = "camera { orthographic location <0.7,0,-3> look_at <0.2,0,0> direction z right 0.01*x up 0.01*y }";
+    let ramp = "plane { z, 0 pigment { gradient x color_map { [0 rgb 0] [1 rgb 1] } } finish { ambient 1 diffuse 0 } }";
     let oblique = "light_source { <0,1732.05,-1000> rgb 1 }";
     for (version, scene, expected) in [
         // Layers of a sky are blended by another rule before 3.7.
@@ -290,6 +300,15 @@ fn colours_are_those_of_povray() {
         // An object may be clipped by its bounds, which else cut nothing.
         (3.7, cube("bounded_by { sphere { 0.2, 0.4 } } clipped_by { bounded_by }"), [1.0; 3]),
         (3.7, cube("clipped_by { sphere { 0.2, 0.4 } } bounded_by { clipped_by }"), [1.0; 3]),
+        // Before version 3.5 the words of a camera take effect in their order.
+        (3.1, format!("{turned} {ramp}"), [0.7; 3]),
+        (3.5, format!("{turned} {ramp}"), [0.2; 3]),
+        // Of a spotlight with parallel rays the cone is of no effect.
+        (3.7, format!("{beam} parallel }} {white}"), [0.5; 3]),
+        (3.7, format!("{beam} }} {white}"), [0.2654; 3]),
+        // Mirrored light has the colours of thin films, too.
+        (3.7, thin("0", "0.3"), [0.3279, 0.321, 0.25]),
+        (3.7, thin("1", "0.3"), [0.7215, 0.7062, 0.55]),
         // Blocks that are not given are black beside pigments.
         (3.7, textured("texture { T } pigment { checker pigment { rgb 1 } translate 0.5*(x+y) }"), [0.5; 3]),
         (
@@ -298,9 +317,11 @@ fn colours_are_those_of_povray() {
             [0.0; 3],
         ),
     ] {
-        let camera = if scene.contains("fog_type") {
+        let camera = if scene.starts_with("camera") {
+            String::new()
+        } else if scene.contains("fog_type") {
             camera.replace("-10*z", "<-2.625,1,-10>")
-        } else if scene.contains("fog") || scene.contains("irid") {
+        } else if scene.contains("fog") || scene.contains("turbulence 0.5") {
             camera.replace("-10*z", "<-2.75,0,-10>")
         } else {
             camera.to_owned()

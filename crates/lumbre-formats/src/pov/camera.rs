@@ -74,7 +74,7 @@ impl CameraStatement {
             self.direction = self.direction.normalize_or(DVec3::Z) * length;
         }
         let mut distance = None;
-        if let Some(target) = self.look_at {
+        if let Some(target) = self.look_at.take() {
             let way = target - self.location;
             if let Some(unit) = way.try_normalize() {
                 distance = Some(way.length());
@@ -177,6 +177,8 @@ impl Parser<'_, '_> {
         let outer = self.declaring.take();
         self.expect(b'{')?;
         let mut moves = Vec::new();
+        // Before version 3.5 what comes later changes what has been aimed.
+        let in_order = self.settings.version < 3.5;
         while !self.take(b'}')? {
             if self.take(b',')? {
                 continue;
@@ -217,11 +219,19 @@ impl Parser<'_, '_> {
                     camera.has_frame = true;
                 }
                 "sky" => camera.sky = self.vector()?,
-                "look_at" => camera.look_at = Some(self.vector()?),
+                "look_at" => {
+                    camera.look_at = Some(self.vector()?);
+                    if in_order {
+                        camera.aim();
+                    }
+                }
                 "angle" => {
                     camera.angle = Some(self.finite()?);
                     if self.take(b',')? || matches!(self.peek()?, Some(Kind::Number(_))) {
                         camera.height_angle = Some(self.finite()?);
+                    }
+                    if in_order {
+                        camera.aim();
                     }
                 }
                 "aperture" => camera.aperture = self.finite()?,
@@ -258,8 +268,9 @@ impl Parser<'_, '_> {
             }
         }
         // Wherever they stand, transforms move what has been aimed.
-        camera.aim();
-        camera.look_at = None;
+        if !in_order {
+            camera.aim();
+        }
         if camera.kind == Projection::Perspective {
             camera.angle = None;
         }
