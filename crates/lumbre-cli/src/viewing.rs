@@ -327,7 +327,7 @@ impl Files {
             spp.unwrap_or(if noise.is_some() { Stop::MAX_FOR_NOISE } else { options.stop.spp });
         let held = diagnostics.memory_held().saturating_add(scene.resolved().accel().memory_bytes() as u64);
         reading.memory().check_picture(&options, held)?;
-        if scene.is_dark() && prepared.is_of_light() {
+        if scene.is_dark_by(options.integrator.kind) {
             warnings
                 .push(format!("warning: {}: the scene has no light: its picture is black", name.display()));
         }

@@ -144,7 +144,7 @@ impl Session {
         let mut save = prepared.save_options(&scene);
         save.exposure = prepared.exposure(&scene, &options)?;
         let mut warnings = diagnostics.lines();
-        if scene.is_dark() && options.integrator.kind.needs_light() {
+        if scene.is_dark_by(options.integrator.kind) {
             let dark = "the scene has no light: its picture is black";
             warnings.push(format!("warning: {}: {dark}", name.display()));
         }

@@ -380,6 +380,12 @@ impl Scene {
         self.resolved.warnings().contains(&BuildWarning::NoLight)
     }
 
+    /// Whether pictures by an integrator are black, since nothing emits light that it shows. By
+    /// [`IntegratorKind::Pov`] surfaces have ambient light.
+    pub fn is_dark_by(&self, integrator: IntegratorKind) -> bool {
+        self.is_dark() && integrator.needs_light() && integrator != IntegratorKind::Pov
+    }
+
     /// The time taken to build the trees and the lights.
     pub fn build_time(&self) -> Duration {
         self.build_time

@@ -6,6 +6,7 @@
 use std::f64::consts::PI;
 use std::path::Path;
 
+use lumbre::description::IntegratorKind;
 use lumbre::formats::{Budget, Diagnostics, Limits, pbrt};
 use lumbre::image::{Image, Rgb};
 use lumbre::{Picture, SaveOptions, Scene, write_image};
@@ -474,7 +475,9 @@ fn a_scene_file_without_light_is_black() {
     let world = r#"Material "diffuse" Shape "disk" "float radius" 5"#;
     assert_eq!(seen(None, r#""path""#, [3.0, 1.0, 6.0], [2.5, 1.5, 0.0], world), [0.0; 3]);
     let text = "WorldBegin\nShape \"sphere\"";
-    assert!(open(None, text).is_dark());
+    let scene = open(None, text);
+    assert!(scene.is_dark() && scene.is_dark_by(IntegratorKind::Path { regularize: false }));
+    assert!(!scene.is_dark_by(IntegratorKind::Normals) && !scene.is_dark_by(IntegratorKind::Pov));
 }
 
 #[test]

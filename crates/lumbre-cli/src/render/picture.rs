@@ -245,7 +245,7 @@ impl<'a> Built<'a> {
                 "glass does not disperse light without --spectral: its index at 587.6 nm is used for all colours",
             )?;
         }
-        if scene.is_dark() && is_of_light {
+        if scene.is_dark_by(self.kind) {
             warn("the scene has no light: its picture is black")?;
         }
         let camera = scene.resolved().cameras().get(options.camera);
