@@ -14,8 +14,6 @@ use crate::progress::Series;
 use crate::reading::Frames;
 use crate::signals::{Phase, Signals};
 
-const READING: Phase = Phase::Preparing("reading the scene");
-
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // Invalid names are reported before the scene is read, invalid folders before it is rendered.
@@ -41,7 +39,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let cancel = CancelToken::new();
     let signals = Signals::listen(&cancel)?;
     signals.end_at(arguments.deadline(start));
-    signals.enter(READING);
+    let reads_pipe = arguments.inputs().any(|path| !path.is_file());
+    let what = "reading the scene";
+    let reading = if reads_pipe { Phase::Receiving(what) } else { Phase::Preparing(what) };
+    signals.enter(reading);
     let mut stage = arguments.staging.stage(arguments.size, arguments.reading.limits())?;
     arguments.view.set(&mut stage)?;
     // The first picture's name and exposure are used for all.
@@ -73,7 +74,7 @@ fn frames(context: Context<'_>, numbers: &RangeInclusive<u32>, first: &mut First
     for number in numbers.clone() {
         let start = Instant::now();
         signals.end_at(arguments.deadline(start));
-        signals.enter(READING);
+        signals.enter(reading);
         let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
         let done = number - numbers.start();
         let series = Series { number, done, count, start: context.start };
