@@ -534,6 +534,8 @@ fn principled_slots(params: &mut PrincipledParams, visit: &mut dyn FnMut(&'stati
     visit(&["diffuse_transmission_color"], Slot::Colour(&mut params.diffuse_transmission_color));
     visit(&["clearcoat"], Slot::Number(&mut params.clearcoat, UNIT));
     visit(&["clearcoat_roughness"], Slot::Number(&mut params.clearcoat_roughness, UNIT));
+    visit(&["clearcoat_color", "coat_color"], Slot::Colour(&mut params.clearcoat_color));
+    visit(&["clearcoat_ior", "coat_ior"], Slot::Plain(&mut params.clearcoat_ior, Range(1.0, 4.0)));
     visit(&["sheen_color"], Slot::Colour(&mut params.sheen_color));
     visit(&["sheen_roughness"], Slot::Number(&mut params.sheen_roughness, UNIT));
     visit(&["iridescence"], Slot::Number(&mut params.iridescence, UNIT));
