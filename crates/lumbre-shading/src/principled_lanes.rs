@@ -235,7 +235,8 @@ impl<R: Real> PrincipledLanes<R> {
         let share = self.coat.share(V3::select(above_o, wo, wi));
         let passes = V3::splat(one - share.or_zero(above_o | above_i));
         let ClearcoatLanes { weight, absorption, darkened, .. } = self.coat;
-        let is_tinted = absorption.max_component().simd_ne(zero) | darkened.min_component().simd_ne(one);
+        let least = darkened.x.simd_min(darkened.y).simd_min(darkened.z);
+        let is_tinted = absorption.max_component().simd_ne(zero) | least.simd_ne(one);
         if is_tinted.none() {
             return passes;
         }

@@ -18,7 +18,7 @@ pub enum Digits {
 ///
 /// # Errors
 /// What is accepted.
-pub fn digits(text: &str) -> Result<Digits, String> {
+pub(super) fn digits(text: &str) -> Result<Digits, String> {
     if text == "full" {
         return Ok(Digits::Full);
     }
