@@ -172,7 +172,10 @@ mod tests {
             for option in options.iter().filter(|option| **option != "scene") {
                 let arg = program.find_subcommand(name).expect(name).get_arguments();
                 let long = arg.filter(|arg| arg.get_id() == *option).find_map(Arg::get_long);
-                assert!(long.is_some_and(|long| short.contains(&format!("--{long}"))), "{name}: {option}\n{short}");
+                assert!(
+                    long.is_some_and(|long| short.contains(&format!("--{long}"))),
+                    "{name}: {option}\n{short}"
+                );
             }
             let command = program.find_subcommand_mut(name).expect(name);
             let long = command.render_long_help().to_string();

@@ -107,7 +107,12 @@ impl Signals {
 
     fn start(cancel: &CancelToken) -> std::io::Result<Self> {
         let last = Arc::new(AtomicUsize::new(0));
-        let state = State { phase: Phase::Preparing("starting"), cancel: cancel.clone(), deadline: None, samples: (0, Instant::now()) };
+        let state = State {
+            phase: Phase::Preparing("starting"),
+            cancel: cancel.clone(),
+            deadline: None,
+            samples: (0, Instant::now()),
+        };
         let signals = Self { last: last.clone(), state: Arc::new(Mutex::new(state)) };
         let (came, hurries) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
         // A signal handler may do almost nothing, so a thread does it.

@@ -1622,8 +1622,9 @@ fn subsurface_and_openpbr_take_their_parameters_by_name() {
     near_rgb(constant(&cloth.base_color), [0.25, 0.125, 0.0625]);
     near_rgb(constant(&cloth.sheen_color), [0.5, 0.5, 0.5]);
     assert_eq!((cloth.ior, constant(&cloth.iridescence_thickness)), (1.7, 300.0));
-    let (_, warnings) =
-        warned(r#"Material "openpbr" "float subsurface_weight" .5 "rgb subsurface_color" [1 .5 1] Shape "sphere""#);
+    let (_, warnings) = warned(
+        r#"Material "openpbr" "float subsurface_weight" .5 "rgb subsurface_color" [1 .5 1] Shape "sphere""#,
+    );
     assert!(warnings.len() == 1 && warnings[0].contains("subsurface_weight"), "{warnings:?}");
     let (scene, warnings) = warned(
         r#"Material "openpbr" "float subsurface_weight" 1 "rgb subsurface_color" [.2 .4 .6] "float subsurface_radius" 4

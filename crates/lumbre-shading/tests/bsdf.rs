@@ -895,7 +895,7 @@ fn a_coloured_coat_tints_by_the_way_through_it() {
                 let sample = bsdf.sample(wo, lobe, Vec2::splat(0.5)).expect("a mirror reflects");
                 sum + sample.weight
             });
-            let face = lumbre_shading::fresnel::dielectric(cos, eta);
+            let face = fresnel::dielectric(cos, eta);
             let metal = 0.5 + 0.5 * (1.0 - cos).powi(5);
             let inside = (1.0 - (1.0 - cos * cos) / (eta * eta)).sqrt();
             let expected = color.map(|c| face + (1.0 - face) * metal * c.powf(1.0 / inside));
@@ -911,13 +911,8 @@ fn a_coat_darkens_grey_by_the_light_that_it_reflects_back_down() {
     // A coat of index 1.5 reflects 0.0918 of even light from outside, so 1 - 0.9082 / 1.5² = 0.5963 from inside. Grey of
     // 0.5 without reflections of its own keeps (1 - 0.5963) / (1 - 0.5 · 0.5963) = 0.5752 of itself.
     let coat = Clearcoat { weight: 1.0, darkening: 1.0, ..Clearcoat::NONE };
-    let grey = Principled {
-        base: Spectrum::splat(0.5),
-        f0: Spectrum::BLACK,
-        f90: 0.0,
-        coat,
-        ..Principled::DEFAULT
-    };
+    let grey =
+        Principled { base: Spectrum::splat(0.5), f0: Spectrum::BLACK, f90: 0.0, coat, ..Principled::DEFAULT };
     let up = LocalDir::new(Vec3::Z);
     let (share, error) = even_furnace(&grey, up, GRID);
     let expected = 0.04 + 0.96 * 0.5 * 0.5752;

@@ -621,12 +621,17 @@ mod tests {
             let mut desc = scene(&format!("Material \"{material}\" Shape \"sphere\""));
             for name in names.iter().chain(&["color", "colour"]) {
                 for value in ["red", "#ff8800", "#F80", "0.25", "0.1,0.2,0.3"] {
-                    assert_eq!(set(&mut desc, &format!("material.0.{name}={value}")), Ok(()), "{material} {name}");
+                    assert_eq!(
+                        set(&mut desc, &format!("material.0.{name}={value}")),
+                        Ok(()),
+                        "{material} {name}"
+                    );
                 }
                 assert!(set(&mut desc, &format!("material.0.{name}=reddish")).is_err());
             }
         }
-        let mut desc = scene("MakeNamedMaterial \"m\" \"string type\" \"diffuse\" NamedMaterial \"m\" Shape \"sphere\"");
+        let mut desc =
+            scene("MakeNamedMaterial \"m\" \"string type\" \"diffuse\" NamedMaterial \"m\" Shape \"sphere\"");
         set(&mut desc, "material.m.colour=#ff0000").unwrap();
         assert_eq!(diffuse(&desc, "m"), Spectrum::new(1.0, 0.0, 0.0));
         let lights = ["point", "spot", "distant", "infinite"];

@@ -194,7 +194,10 @@ help NAME      one function
         ("transpose", "the transpose"),
         ("det", "the determinant"),
         ("rank", "how many rows, and how many columns, are independent"),
-        ("eigenvalues", "the real λ with M v = λ v for some v, in ascending order; the steps show complex ones"),
+        (
+            "eigenvalues",
+            "the real λ with M v = λ v for some v, in ascending order; the steps show complex ones",
+        ),
         ("solve", "the x with M x = b, by Cramer's rule, for 1 to 4 unknowns"),
         ("matrix", "the 4×4 matrix of a transform, or the 3×3 matrix of a quaternion"),
         ("linear", "the 3×3 block of a transform"),

@@ -334,7 +334,8 @@ fn eigenvalues(call: &mut Call) -> Result<Value, Wrong> {
         call.work.line(texts.symmetric);
     }
     if m.rows == 2 {
-        let [[a, b], [c, d]] = [[m.cells[0][0], m.cells[0][1]], [m.cells[1][0], m.cells[1][1]]].map(|row| row.map(factor));
+        let [[a, b], [c, d]] =
+            [[m.cells[0][0], m.cells[0][1]], [m.cells[1][0], m.cells[1][1]]].map(|row| row.map(factor));
         call.work.line("λ = (m11 + m22)/2 ± √(((m11 - m22)/2)² + m12 m21)");
         call.work.line(format!("= ({a} + {d})/2 ± √((({a} - {d})/2)² + {b}·{c})"));
     }

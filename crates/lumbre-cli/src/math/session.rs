@@ -206,7 +206,8 @@ impl<'a> Reader<'a> {
         while self.is_at('*') || self.is_at('/') {
             let sign = self.advance()?;
             let is_product = sign.kind == TokenKind::Symbol('*');
-            let right = self.signed(if is_product { Coefficient::Allowed } else { Coefficient::Ambiguous })?;
+            let right =
+                self.signed(if is_product { Coefficient::Allowed } else { Coefficient::Ambiguous })?;
             let result = if is_product {
                 operators::multiply(&left, &right, &mut self.work)
             } else {
@@ -222,8 +223,7 @@ impl<'a> Reader<'a> {
         while self.is_at('+') || self.is_at('-') {
             is_negative ^= self.advance()?.kind == TokenKind::Symbol('-');
         }
-        let begins_operand =
-            matches!(self.next.kind, TokenKind::Name(_) | TokenKind::Symbol('(' | '['));
+        let begins_operand = matches!(self.next.kind, TokenKind::Name(_) | TokenKind::Symbol('(' | '['));
         let value = match self.token.kind {
             TokenKind::Number(factor) if begins_operand && self.next.is_adjacent => {
                 if coefficient == Coefficient::Ambiguous {

@@ -194,7 +194,10 @@ help NOMBRE    una función
         ("transpose", "la traspuesta"),
         ("det", "el determinante"),
         ("rank", "cuántas filas, y cuántas columnas, son independientes"),
-        ("eigenvalues", "los λ reales con M v = λ v para algún v, en orden ascendente; los pasos muestran los complejos"),
+        (
+            "eigenvalues",
+            "los λ reales con M v = λ v para algún v, en orden ascendente; los pasos muestran los complejos",
+        ),
         ("solve", "el x con M x = b, por la regla de Cramer, con 1 a 4 incógnitas"),
         ("matrix", "la matriz de 4×4 de una transformación, o la de 3×3 de un cuaternión"),
         ("linear", "el bloque de 3×3 de una transformación"),

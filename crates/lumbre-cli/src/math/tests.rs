@@ -151,10 +151,7 @@ fn mistakes_say_where_what_and_what_would_do() {
             "x + 2",
             "expression:1:3: + is not defined for these (found a vector of 3 + a number; expected two numbers, vectors, matrices or quaternions of the same size)\n  x + 2\n    ^",
         ),
-        (
-            "norm",
-            "expression:1:1: this is a function (found \"norm\"; expected norm(a))\n  norm\n  ^",
-        ),
+        ("norm", "expression:1:1: this is a function (found \"norm\"; expected norm(a))\n  norm\n  ^"),
         (
             "1/2x",
             "expression:1:3: after / and ^ a product without * can be read in two ways (expected parentheses, as in 1/(2*x) or (1/2)*x)\n  1/2x\n    ^",
@@ -280,7 +277,12 @@ fn steps_of_eigenvalues_and_ranks_prove_them() {
         lines.join("\n")
     };
     let pair = steps("eigenvalues([[0, -1, 0], [1, 0, 0], [0, 0, -2]])");
-    for line in ["det(λ I - M) = λ³ + 2 λ² + λ + 2 = 0", "λ1 = -2", "λ2, λ3 = 0 ± 1 i", "the result has the real ones"] {
+    for line in [
+        "det(λ I - M) = λ³ + 2 λ² + λ + 2 = 0",
+        "λ1 = -2",
+        "λ2, λ3 = 0 ± 1 i",
+        "the result has the real ones",
+    ] {
         assert!(pair.contains(line), "{line}: {pair}");
     }
     let two = steps("eigenvalues([[2, 1], [1, 2]])");
@@ -288,7 +290,11 @@ fn steps_of_eigenvalues_and_ranks_prove_them() {
         assert!(two.contains(line), "{line}: {two}");
     }
     let rank = steps("rank([[1, 2, 3], [2, 4, 7], [3, 6, 10]])");
-    for line in ["rows 1, 2 and columns 1, 3 are independent", "| 1  3 |", "every determinant of 3 rows and 3 columns is 0"] {
+    for line in [
+        "rows 1, 2 and columns 1, 3 are independent",
+        "| 1  3 |",
+        "every determinant of 3 rows and 3 columns is 0",
+    ] {
         assert!(rank.contains(line), "{line}: {rank}");
     }
     let rounded = steps("rank([[0.1, 0.2], [0.3, 0.6]])");

@@ -259,7 +259,8 @@ mod tests {
         let quarter_turn = of([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
         assert_eq!(quarter_turn, Eigenvalues { real: vec![1.0], pairs: vec![[0.0, 1.0]] });
         // The companion matrix of (λ² + 4)².
-        let twice = of([[0.0, 0.0, 0.0, -16.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, -8.0], [0.0, 0.0, 1.0, 0.0]]);
+        let twice =
+            of([[0.0, 0.0, 0.0, -16.0], [1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, -8.0], [0.0, 0.0, 1.0, 0.0]]);
         assert_eq!(twice, Eigenvalues { real: vec![], pairs: vec![[0.0, 2.0]; 2] });
         assert_eq!(eigenvalues(&[[f64::INFINITY]]), None);
         assert_eq!(characteristic_polynomial(&[[2.0, 1.0], [1.0, 2.0]]), Some(vec![1.0, -4.0, 3.0]));
@@ -280,7 +281,10 @@ mod tests {
         }
         for size in [1e-200, 1e200] {
             let found = of([[2.0 * size, size], [size, 2.0 * size]]).real;
-            assert!(found.iter().zip([1.0, 3.0]).all(|(x, e)| (x / size / e - 1.0).abs() < 1e-15), "{found:?}");
+            assert!(
+                found.iter().zip([1.0, 3.0]).all(|(x, e)| (x / size / e - 1.0).abs() < 1e-15),
+                "{found:?}"
+            );
         }
         // The Hilbert matrix of 4, to 17 digits (by arithmetic with 60 digits).
         let hilbert = std::array::from_fn(|i| std::array::from_fn(|j| 1.0 / (1 + i + j) as f64));
