@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lumbre::{CancelToken, Part, Prepared, Scene, SceneInfo, Stage};
@@ -37,11 +37,17 @@ pub(crate) struct Arguments {
     reading: ReadingArguments,
 }
 
+/// Whether the name is that of a part or a checkpoint: then the message is about that, whatever is in the file.
+fn is_called_part(path: &Path) -> bool {
+    let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+    ending.is_some_and(|ending| ending == "part" || ending == "checkpoint")
+}
+
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let _signals = Signals::listen(&CancelToken::new())?;
     if let [path] = &arguments.scene[..]
-        && Part::is_in(path)
+        && (Part::is_in(path) || is_called_part(path))
     {
         let part = open_part(path, arguments.reading.memory())?;
         return print(&about_part(&part, arguments.json));

@@ -114,7 +114,7 @@ mod viewing;
 pub use cast::{Query, cast};
 #[cfg(not(target_family = "wasm"))]
 pub use explain::program::Explainer;
-pub use explain::{Format, Request, SceneNames, explain};
+pub use explain::{Digits, Format, Request, SceneNames, explain};
 pub use failure::Failure;
 pub use language::Language;
 pub use math::calculate;

@@ -100,6 +100,7 @@ impl ProgressReporter<'_> {
 
 impl Progress for ProgressReporter<'_> {
     fn state(&self, state: &State) {
+        self.signals.took(state.samples);
         let pass = self.pass.lock().map(|pass| *pass).unwrap_or_default();
         self.display.state(state, &pass, self.series.as_ref());
     }

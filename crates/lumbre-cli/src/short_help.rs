@@ -16,7 +16,6 @@ const ESSENTIAL: [(&str, &[&str]); 3] = [
             "noise",
             "denoise",
             "integrator",
-            "spectral",
             "camera",
             "azimuth",
             "elevation",
@@ -62,6 +61,7 @@ const ESSENTIAL: [(&str, &[&str]); 3] = [
             "sample",
             "depth",
             "only",
+            "digits",
             "format",
             "output",
             "lang",
@@ -71,18 +71,44 @@ const ESSENTIAL: [(&str, &[&str]); 3] = [
     ),
 ];
 
-/// Makes `-h` short for all commands; `more` says that there is more.
-pub(crate) fn shorten(program: Command, more: &str) -> Command {
+/// What `-h` says of options of `render` and `view` whose first sentence is long.
+const SUMMARIES: [(&str, &str); 12] = [
+    ("time", "Stop after this time, as 90s, 2m or 1h30m"),
+    ("noise", "Stop sampling a pixel at this share of noise, such as 0.02"),
+    ("integrator", "What each pixel shows: light (path, caustics, …) or normals, depth, albedo, uv"),
+    ("azimuth", "Go around the model to the right, in degrees"),
+    ("elevation", "Go up, in degrees"),
+    ("frames", "Frames of an animation, as -o frame.####.png or -o walk.gif"),
+    ("turntable", "N pictures from all around the model, as -o frame.####.png or -o turn.gif"),
+    ("ground", "What the model stands on: none, shadow or plane"),
+    ("env", "Light from all around: a picture, studio, sky:TIME,LATITUDE,LONGITUDE or none"),
+    ("background", "What is behind everything: env, studio, transparent, a colour or an image"),
+    ("settings", "Set a parameter of the scene, as material.0.color=red or camera.fov=40"),
+    ("resume", "Continue from a checkpoint"),
+];
+
+/// How many examples `-h` has.
+const EXAMPLES: usize = 3;
+
+/// Makes `-h` short for all commands; `more` says that there is more. `is_short` says that `-h` is on the command line:
+/// what it lists is then in one list, by importance.
+pub(crate) fn shorten(program: Command, more: &str, is_short: bool) -> Command {
     program.mut_subcommands(|command| {
         let name = command.get_name().to_owned();
         let essential = ESSENTIAL.iter().find(|(of, _)| *of == name).map(|(_, options)| *options);
         let command = command.mut_args(|arg| {
-            let is_listed = essential.is_none_or(|options| options.contains(&arg.get_id().as_str()));
+            let id = arg.get_id().as_str().to_owned();
             let arg = with_sentence(arg);
-            if is_listed { arg } else { arg.hide_short_help(true) }
+            let Some(options) = essential else { return arg };
+            let Some(place) = options.iter().position(|option| *option == id) else {
+                return arg.hide_short_help(true);
+            };
+            if is_short && !arg.is_positional() { in_one_list(arg, &name, place) } else { arg }
         });
         let Some(examples) = command.get_after_help().map(ToString::to_string) else { return command };
         let first = examples.split("\n\n").next().unwrap_or_default();
+        let lines = if essential.is_some() { 1 + EXAMPLES } else { usize::MAX };
+        let first = first.lines().take(lines).collect::<Vec<_>>().join("\n");
         let rest =
             if essential.is_some() { format!("\n\n{more}: lumbre {name} --help") } else { String::new() };
         let short = format!("{first}{rest}");
@@ -96,6 +122,22 @@ fn with_sentence(arg: Arg) -> Arg {
     let long = arg.get_long_help().map_or_else(|| help.clone(), ToString::to_string);
     let sentence = help.split(". ").next().unwrap_or_default().to_owned();
     arg.help(sentence).long_help(long)
+}
+
+/// An option of a command as one line of a single list.
+fn in_one_list(arg: Arg, command: &str, place: usize) -> Arg {
+    /// The longest name of a value that leaves room for the sentence.
+    const MAX_NAME: usize = 16;
+    let names = arg.get_value_names().unwrap_or_default();
+    let is_long = names.iter().map(|name| name.len()).sum::<usize>() > MAX_NAME;
+    let id = arg.get_id().as_str().to_owned();
+    let summary = SUMMARIES.iter().find(|(of, _)| command != "explain" && *of == id);
+    let arg = arg.help_heading(None).hide_possible_values(true).hide_default_value(true).display_order(place);
+    let arg = if is_long { arg.value_name("…") } else { arg };
+    match summary {
+        Some((_, summary)) => arg.help(*summary),
+        None => arg,
+    }
 }
 
 #[cfg(test)]
@@ -117,11 +159,26 @@ mod tests {
 
     #[test]
     fn short_help_fits_on_a_screen_and_long_help_has_all() {
-        let mut program = shorten(crate::Arguments::command(), "More");
-        for (name, _) in ESSENTIAL {
+        let mut program = shorten(crate::Arguments::command(), "More", false);
+        let mut in_short = shorten(crate::Arguments::command(), "More", true);
+        for (name, options) in ESSENTIAL {
+            let short = in_short.find_subcommand_mut(name).expect(name).render_help().to_string();
+            // Beside the options: what it does, usage, the scene, three examples, and lines between.
+            let count = short.lines().count();
+            assert!(count <= options.len() + 16, "{name}: {count} lines:\n{short}");
+            for line in short.lines() {
+                assert!(line.chars().count() <= 120, "{name}: {line}");
+            }
+            for option in options.iter().filter(|option| **option != "scene") {
+                let arg = program.find_subcommand(name).expect(name).get_arguments();
+                let long = arg.filter(|arg| arg.get_id() == *option).find_map(Arg::get_long);
+                assert!(
+                    long.is_some_and(|long| short.contains(&format!("--{long}"))),
+                    "{name}: {option}\n{short}"
+                );
+            }
             let command = program.find_subcommand_mut(name).expect(name);
-            let (short, long) = (command.render_help().to_string(), command.render_long_help().to_string());
-            assert!(short.lines().count() <= 60, "{name}: {} lines", short.lines().count());
+            let long = command.render_long_help().to_string();
             for arg in command.get_arguments().filter(|arg| !arg.is_hide_set()).filter_map(Arg::get_long) {
                 assert!(long.contains(&format!("--{arg}")), "{name} --{arg}");
             }

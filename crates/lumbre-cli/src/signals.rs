@@ -16,8 +16,11 @@ use crate::failure::Failure;
 /// What the program is doing, which says what becomes of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Phase {
-    /// What leaves nothing to save, by what it is: it ends at once.
+    /// What leaves nothing to save, by what it is: a signal ends it at once. It has no deadline, for `--time` gives a
+    /// picture, however coarse.
     Preparing(&'static str),
+    /// As [`Phase::Preparing`], but of what someone else writes and may never end: [`RECEIVING_GRACE`].
+    Receiving(&'static str),
     /// Rendering: it has [`GRACE`] to stop on its own, with the result so far.
     Rendering,
     /// Opening a pipe since this time, where no one may be to read: [`GRACE`].
@@ -28,12 +31,13 @@ pub(crate) enum Phase {
     Saving,
 }
 
-/// How much later than its end preparing may be done, for a coarse picture rather than none.
-const PREPARING_GRACE: Duration = Duration::from_secs(10);
+/// How much later than its deadline the last byte of a pipe may come.
+const RECEIVING_GRACE: Duration = Duration::from_secs(10);
 /// How long a render may take to stop.
 const GRACE: Duration = Duration::from_millis(1500);
-/// How much later than its deadline a render may stop: its first, coarse picture is taken whatever the time.
-const COARSE_GRACE: Duration = Duration::from_secs(10);
+/// How long a render may go without a sample after its deadline: its first, coarse picture is taken whatever the time,
+/// but a sample may have no end.
+const SAMPLE_GRACE: Duration = Duration::from_secs(10);
 /// How long a picture that took its time to render may take to be saved. Who cannot wait sends another signal.
 const SAVING_GRACE: Duration = Duration::from_secs(20);
 /// Between two looks.
@@ -79,6 +83,8 @@ struct State {
     phase: Phase,
     cancel: CancelToken,
     deadline: Option<Deadline>,
+    /// How many samples a render has taken, and since when.
+    samples: (u64, Instant),
 }
 
 /// A time by which the work has to end.
@@ -101,7 +107,12 @@ impl Signals {
 
     fn start(cancel: &CancelToken) -> std::io::Result<Self> {
         let last = Arc::new(AtomicUsize::new(0));
-        let state = State { phase: Phase::Preparing("starting"), cancel: cancel.clone(), deadline: None };
+        let state = State {
+            phase: Phase::Preparing("starting"),
+            cancel: cancel.clone(),
+            deadline: None,
+            samples: (0, Instant::now()),
+        };
         let signals = Self { last: last.clone(), state: Arc::new(Mutex::new(state)) };
         let (came, hurries) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
         // A signal handler may do almost nothing, so a thread does it.
@@ -119,6 +130,14 @@ impl Signals {
     /// The exit status of the received signal, if any.
     pub(crate) fn received(&self) -> Option<u8> {
         u8::try_from(self.last.load(Ordering::Relaxed)).ok().filter(|status| *status != 0)
+    }
+
+    /// Says how many samples a render has taken so far.
+    pub(crate) fn took(&self, samples: u64) {
+        let mut state = lock(&self.state);
+        if samples != state.samples.0 {
+            state.samples = (samples, Instant::now());
+        }
     }
 
     /// Says what the program is doing from now on.
@@ -254,7 +273,7 @@ impl Watcher {
             }
             let elapsed = first.map(|at| at.elapsed());
             match (state.phase, elapsed) {
-                (Phase::Preparing(_), Some(_)) => end(status),
+                (Phase::Preparing(_) | Phase::Receiving(_), Some(_)) => end(status),
                 (Phase::Rendering, Some(elapsed)) if elapsed > GRACE => {
                     say!("error: the render takes too long to stop; nothing was saved");
                     end(status);
@@ -268,7 +287,7 @@ impl Watcher {
                 (_, Some(_)) => {}
                 (phase, None) => {
                     if let Some(deadline) = state.deadline {
-                        check(phase, deadline);
+                        check(phase, deadline, state.samples.1);
                     }
                 }
             }
@@ -295,15 +314,15 @@ impl Signals {
     }
 }
 
-/// Ends the program if its time is over.
-fn check(phase: Phase, deadline: Deadline) {
+/// Ends the program if its time is over; the last sample was taken at `last`.
+fn check(phase: Phase, deadline: Deadline, last: Instant) {
     let over = Instant::now().saturating_duration_since(deadline.at);
     let time = crate::units::spoken(deadline.time);
     match phase {
-        Phase::Preparing(what) if over > PREPARING_GRACE => {
+        Phase::Receiving(what) if over > RECEIVING_GRACE => {
             say!("error: --time: {time} passed while {what}; nothing was rendered");
         }
-        Phase::Rendering if over > COARSE_GRACE => {
+        Phase::Rendering if over.min(last.elapsed()) > SAMPLE_GRACE => {
             say!("error: --time: {time} passed, and the render takes too long to stop; nothing was saved");
         }
         Phase::Opening(since) if over.min(since.elapsed()) > GRACE => {

@@ -62,6 +62,11 @@ const ARGUMENTS: &[(&str, &str, &str)] = &[
         "Muestra solo las secciones con estas claves, las de JSON: camera, equation, Quadratic, hit, transform, light, radiance, …",
         "CLAVE,…",
     ),
+    (
+        "digits",
+        "Cifras de los números: full (todas), o a lo sumo tantas, como 6. JSON las tiene siempre todas [por defecto: full]",
+        "N|full",
+    ),
     ("output", "Escribe en este archivo", "ARCHIVO"),
     ("size", "Ancho y alto de la imagen en píxeles", "ANCHOxALTO"),
     ("camera", "Una cámara de la escena, por su nombre o su índice desde 0", "NOMBRE|ÍNDICE"),
@@ -189,7 +194,7 @@ const EXPLAIN: (&str, &str, &str) = (
   lumbre explain scene.pbrt --ray 0,2,-5,0,0,1 --shape sphere --lang es     por qué el rayo no la corta
   lumbre explain scene.pbrt --pixel 320,240 --only equation,radiance --lang es
   lumbre explain scene.pbrt --pixel 320,240 --format html -o pixel.html --lang es
-  lumbre explain scene.pbrt --pixel 320,240 --sample 7 --depth 2 --lang es",
+  lumbre explain scene.pbrt --pixel 320,240 --sample 7 --depth 2 --digits 6 --lang es",
 );
 
 const MATH: (&str, &str, &str) = (
@@ -254,6 +259,7 @@ fn translated_argument(argument: Arg) -> Arg {
 /// What readers of values say, in both languages; `{}` stands for what is the same in both.
 const EXPECTATIONS: &[(&str, &str)] = &[
     ("expected two whole numbers, such as 320,240", "se esperaban dos números enteros, como 320,240"),
+    ("expected full, or a whole number from 1 to 17", "se esperaba full, o un número entero de 1 a 17"),
     (
         "expected six numbers, the origin and the direction, such as 0,0,-5,0,0,1",
         "se esperaban seis números, el origen y la dirección, como 0,0,-5,0,0,1",

@@ -114,11 +114,12 @@ const COMMANDS: &[(&str, &[&str])] = &[
 /// The exit status: 0 for help, 2 for wrong usage.
 pub(crate) fn parse<P: Parser + CommandFactory>(arguments: &[OsString]) -> Result<P, u8> {
     let is_spanish = spanish::is_asked_for(arguments);
+    let is_short = arguments.iter().any(|argument| argument == "-h");
     let read = |words: &[OsString]| {
         let program = if is_spanish {
-            shorten(spanish::translated(P::command()), "Todas las opciones y más ejemplos")
+            shorten(spanish::translated(P::command()), "Todas las opciones y más ejemplos", is_short)
         } else {
-            shorten(P::command(), "All options, and more examples")
+            shorten(P::command(), "All options, and more examples", is_short)
         };
         P::from_arg_matches(&program.try_get_matches_from(words)?)
     };

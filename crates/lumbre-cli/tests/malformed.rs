@@ -17,6 +17,8 @@ const HEAD: &str = "Film \"rgb\" \"integer xresolution\" 4 \"integer yresolution
 struct Case {
     name: String,
     bytes: Vec<u8>,
+    /// Files that it names.
+    files: Vec<(String, Vec<u8>)>,
     status: i32,
     said: String,
 }
@@ -30,6 +32,7 @@ fn cases(text: &str) -> Vec<Case> {
             let (body, rest) = rest.rsplit_once("\n--- ").unwrap_or(("", &rest["--- ".len()..]));
             let (status, said) = rest.split_once('\n').unwrap();
             let body = format!("{body}\n");
+            let (files, body) = files_of(&body);
             // A backslash at the end of the last line: the file has no end of line there.
             let body = body.strip_suffix("\\\n").unwrap_or(&body);
             let (head, body) = match body.strip_prefix("@HEAD\n") {
@@ -38,9 +41,44 @@ fn cases(text: &str) -> Vec<Case> {
             };
             let bytes = [head.as_bytes(), &unescaped(body)].concat();
             let said = said.lines().next().unwrap().to_owned();
-            Case { name: name.to_owned(), bytes, status: status.parse().unwrap(), said }
+            Case { name: name.to_owned(), bytes, files, status: status.parse().unwrap(), said }
         })
         .collect()
+}
+
+/// The files of the lines in front that make some, and the rest of the body: `@FILE NAME text`, with `\n` between lines;
+/// `@CUT NAME COUNT of SOURCE`, the first bytes of a picture's file; `@PUT NAME HEX at OFFSET of SOURCE`, with some
+/// bytes replaced.
+fn files_of(body: &str) -> (Vec<(String, Vec<u8>)>, String) {
+    let source = |name: &str| {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/pictures/images");
+        fs::read(folder.join(name)).unwrap()
+    };
+    let mut files = Vec::new();
+    let mut rest = body;
+    while let Some((line, after)) = rest.split_once('\n') {
+        let words: Vec<&str> = line.split(' ').collect();
+        let (name, bytes) = match words[..] {
+            ["@FILE", name, ..] => {
+                let text = line.splitn(3, ' ').nth(2).unwrap_or_default();
+                (name, text.replace("\\n", "\n").into_bytes())
+            }
+            ["@CUT", name, count, "of", of] => {
+                (name, source(of)[..count.parse::<usize>().unwrap()].to_owned())
+            }
+            ["@PUT", name, hex, "at", offset, "of", of] => {
+                let (mut bytes, offset) = (source(of), offset.parse::<usize>().unwrap());
+                for (i, digits) in hex.as_bytes().chunks(2).enumerate() {
+                    bytes[offset + i] = u8::from_str_radix(std::str::from_utf8(digits).unwrap(), 16).unwrap();
+                }
+                (name, bytes)
+            }
+            _ => break,
+        };
+        files.push((name.to_owned(), bytes));
+        rest = after;
+    }
+    (files, rest.to_owned())
 }
 
 /// `\xNN` is a byte and `\\` a backslash.
@@ -76,13 +114,18 @@ fn every_malformed_file_gets_its_message() {
     for file in fs::read_dir(catalogue).unwrap() {
         all.extend(cases(&fs::read_to_string(file.unwrap().path()).unwrap()));
     }
-    assert!(all.len() >= 270, "{}", all.len());
+    assert!(all.len() >= 400, "{}", all.len());
+    for name in ["cloud.nvdb", "satin.bsdf"] {
+        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/pictures/images").join(name);
+        fs::copy(from, folder.path(name)).unwrap();
+    }
     let wrong = Mutex::new(Vec::new());
     rayon::scope(|scope| {
-        for Case { name, bytes, status, said } in &all {
+        for Case { name, bytes, files, status, said } in &all {
             let (folder, wrong) = (&folder, &wrong);
             scope.spawn(move |_| {
                 fs::write(folder.path(name), bytes).unwrap();
+                files.iter().for_each(|(name, bytes)| fs::write(folder.path(name), bytes).unwrap());
                 let is_of_rays = name.ends_with(".csv") || name.ends_with(".npy");
                 let arguments =
                     if is_of_rays { vec!["cast", "good.pbrt", "--rays", name] } else { vec!["info", name] };

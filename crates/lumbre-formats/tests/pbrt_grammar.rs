@@ -1622,9 +1622,32 @@ fn subsurface_and_openpbr_take_their_parameters_by_name() {
     near_rgb(constant(&cloth.base_color), [0.25, 0.125, 0.0625]);
     near_rgb(constant(&cloth.sheen_color), [0.5, 0.5, 0.5]);
     assert_eq!((cloth.ior, constant(&cloth.iridescence_thickness)), (1.7, 300.0));
-    let (_, warnings) =
-        warned(r#"Material "openpbr" "float subsurface_weight" 1 "rgb coat_color" [1 .5 1] Shape "sphere""#);
-    assert!(warnings.len() == 2 && warnings[0].contains("subsurface_weight"), "{warnings:?}");
+    let (_, warnings) = warned(
+        r#"Material "openpbr" "float subsurface_weight" .5 "rgb subsurface_color" [1 .5 1] Shape "sphere""#,
+    );
+    assert!(warnings.len() == 1 && warnings[0].contains("subsurface_weight"), "{warnings:?}");
+    let (scene, warnings) = warned(
+        r#"Material "openpbr" "float subsurface_weight" 1 "rgb subsurface_color" [.2 .4 .6] "float subsurface_radius" 4
+             "float subsurface_scatter_anisotropy" .5 "float specular_ior" 1.4 "float specular_roughness" .5
+             "rgb base_color" [1 0 0] "float coat_weight" .5 "rgb coat_color" [1 0 1] Shape "sphere""#,
+    );
+    assert!(warnings.len() == 1 && warnings[0].contains("coat_weight"), "{warnings:?}");
+    let MaterialKind::Subsurface(skin) = kind(&scene, 0) else { panic!("{:?}", kind(&scene, 0)) };
+    near_rgb(anywhere(skin).extinction, [0.25, 0.5, 1.0]);
+    assert_eq!((skin.eta, skin.asymmetry, skin.roughness.remap), (1.4, 0.5, false));
+    assert!(matches!(*skin.roughness.u, Texture::Constant(0.25)));
+    let scene = world(
+        r#"Material "openpbr" "float coat_weight" 1 "rgb coat_color" [1 .5 .25] "float coat_ior" 2 "float coat_darkening" .5
+             Shape "sphere"
+           Material "openpbr" Shape "sphere""#,
+    );
+    let coats = [0, 1].map(|shape| match kind(&scene, shape) {
+        MaterialKind::Principled(params) => {
+            (constant(&params.clearcoat_color), params.clearcoat_ior, params.clearcoat_darkening)
+        }
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(coats, [(Rgb::new(1.0, 0.5, 0.25), 2.0, 0.5), (Rgb::WHITE, 1.6, 1.0)]);
 }
 
 // What is of pbrt alone.

@@ -5,6 +5,10 @@
 //! in full; only a result is rounded. That costs microseconds, which is fine for a single matrix: what renders uses
 //! [`Transform`](crate::Transform).
 
+mod eigen;
+
+pub use eigen::{Eigenvalues, characteristic_polynomial, eigenvalues};
+
 /// A whole number times a power of two.
 #[derive(Clone, Debug, PartialEq)]
 struct Exact {
@@ -267,7 +271,7 @@ pub fn solve<const N: usize>(rows: &[[f64; N]; N], b: &[f64; N]) -> Solutions<N>
     }
     let mut extended = m.clone();
     extended.iter_mut().zip(&right[0]).for_each(|(row, entry)| row.push(entry.clone()));
-    if rank(extended) > rank(m) { Solutions::None } else { Solutions::Many }
+    if exact_rank(extended) > exact_rank(m) { Solutions::None } else { Solutions::Many }
 }
 
 /// The determinants of `M` with each column in turn replaced by `b`, exact and rounded once: the numerators of Cramer's
@@ -283,8 +287,13 @@ pub fn numerators<const N: usize>(rows: &[[f64; N]; N], b: &[f64; N]) -> Option<
     })
 }
 
-/// How many rows are independent, by elimination without quotients.
-fn rank(mut m: Rows) -> usize {
+/// How many rows, and how many columns, are independent. 0 where an entry is not finite.
+pub fn rank<const R: usize, const C: usize>(rows: &[[f64; C]; R]) -> usize {
+    exact_rows(rows).map_or(0, exact_rank)
+}
+
+/// By elimination without quotients.
+fn exact_rank(mut m: Rows) -> usize {
     let columns = m.first().map_or(0, Vec::len);
     let mut rank = 0;
     for column in 0..columns {
@@ -395,6 +404,16 @@ mod tests {
             }
         }
         assert!(singular > 700 && none > 500 && many > 5, "{singular} {none} {many}");
+    }
+
+    #[test]
+    fn ranks_are_those_of_sums_of_rows() {
+        assert_eq!(rank(&[[0.0; 3]; 2]), 0);
+        assert_eq!(rank(&[[0.1, 0.2, 0.3, 0.4], [0.2, 0.4, 0.6, 0.8]]), 1);
+        assert_eq!(rank(&[[0.0, -0.3, 0.2], [0.3, 0.0, -0.1], [-0.2, 0.1, 0.0]]), 2);
+        assert_eq!(rank(&[[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]), 2);
+        assert_eq!(rank(&[[1e-300, 0.0], [0.0, 1e300]]), 2);
+        assert_eq!(rank(&[[f64::NAN]]), 0);
     }
 
     #[test]

@@ -33,6 +33,7 @@
 //! | product and transpose of matrices | `*` and `transpose` of glam; of any size [`matrix::product`], [`matrix::transpose`] |
 //! | linear equations, Cramer's rule | [`matrix::solve`]; of any size, and how many solutions there are, [`exact::solve`] |
 //! | determinant, cofactors, inverse without rounding on the way | [`exact::determinant`], [`exact::cofactors`], [`exact::inverse`] |
+//! | rank, eigenvalues, characteristic polynomial | [`exact::rank`], [`exact::eigenvalues`], [`exact::characteristic_polynomial`] |
 //! | inverse of an affine matrix | [`Transform::from_matrix`] and [`Transform::inverse`] |
 //! | scale, shear, rotation, mirror of the plane | [`matrix::scale2`], [`matrix::shear2`], [`matrix::rotation2`], [`matrix::mirror2_about_y`] |
 //! | scale, shear, translation of space | [`Transform::scale`], [`Transform::shear`], [`Transform::translate`] |

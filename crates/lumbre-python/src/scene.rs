@@ -430,8 +430,9 @@ impl Scene {
             Ray::new(origin.into(), direction.into()).with_range(from, to)
         });
         let RenderRequest { shown, options, .. } = self.asked(py, options)?;
-        let only = Vec::new();
-        let request = Request { pixel, ray, format, lang, depth, sample, nearest, shape, all_shapes, only };
+        let (only, digits) = (Vec::new(), lumbre_cli::Digits::Full);
+        let request =
+            Request { pixel, ray, format, lang, depth, sample, nearest, shape, all_shapes, only, digits };
         let explain = || {
             let things = self.things.get_or_init(|| SceneNames::of(&self.desc));
             lumbre_cli::explain(&shown.scene, &options, things, &self.name, &request)

@@ -1,8 +1,9 @@
 //! One layered surface for all parameters of glTF and of the principled materials.
 
-use lumbre_math::{Vec2, Vec3};
+use lumbre_math::{Elementary, Vec2, Vec3};
 use lumbre_simd::V3;
 
+use crate::albedo::ALBEDO;
 use crate::dielectric::Dielectric;
 use crate::lanes::{LaneBsdf, Row, colour_lane, lane, spectrum, square};
 use crate::microfacet::Microfacets;
@@ -81,7 +82,7 @@ pub enum Body {
     },
 }
 
-/// A transparent lacquer of index 1.5.
+/// A transparent lacquer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearcoat {
     /// The share of the surface that it covers, in [0, 1].
@@ -90,21 +91,36 @@ pub struct Clearcoat {
     pub alpha: f32,
     /// Its normal in the shading frame: unit, z > 0.
     pub normal: Vec3,
+    /// Its index of refraction, 1 or more.
+    pub eta: f32,
+    /// The colour of what passes it twice along its normal, in [0, 1]; oblique light passes more of it.
+    pub color: Spectrum,
+    /// How much of the light that the lacquer reflects back down darkens the base, in [0, 1]: none at 0. White stays
+    /// white.
+    pub darkening: f32,
 }
 
 impl Clearcoat {
-    /// The index of refraction of the lacquer.
+    /// The index of refraction of most lacquers.
     pub const ETA: f32 = 1.5;
 
     /// No coat.
-    pub const NONE: Self = Self { weight: 0.0, alpha: 0.0, normal: Vec3::Z };
+    pub const NONE: Self = Self {
+        weight: 0.0,
+        alpha: 0.0,
+        normal: Vec3::Z,
+        eta: Self::ETA,
+        color: Spectrum::WHITE,
+        darkening: 0.0,
+    };
 
     fn face(&self) -> Dielectric {
-        Dielectric { eta: Self::ETA, facets: Microfacets::new(self.alpha, self.alpha) }
+        Dielectric { eta: self.eta, facets: Microfacets::new(self.alpha, self.alpha) }
     }
 
-    fn lane(&self) -> ClearcoatLanes<f32> {
-        ClearcoatLanes { weight: self.weight, alpha: self.alpha, normal: lane(self.normal) }
+    /// Half of what it absorbs along its normal, as the exponent of Beer and Lambert's law.
+    fn absorption(&self) -> Spectrum {
+        self.color.map(|c| if c < 1.0 { -0.5 * c.max(1e-6).logarithm() } else { 0.0 })
     }
 }
 
@@ -181,8 +197,9 @@ impl Principled {
         let plastic = face + through * diffuse;
         let clear = face + through * self.transmission_color;
         let base = metal.lerp(plastic.lerp(clear, self.transmission), 1.0 - self.metallic);
-        let coat = all.coat.share(V3::new(0.0, 0.0, 1.0));
-        base * (1.0 - coat) + Spectrum::splat(coat)
+        let normal = V3::new(0.0, 0.0, 1.0);
+        let coat = all.coat.share(normal);
+        base * spectrum(all.under_coat(normal, normal)) + Spectrum::splat(coat)
     }
 
     /// The solid inside another of this index; see [`crate::Bsdf::immersed`].
@@ -209,6 +226,32 @@ impl Principled {
     /// Below this difference of η from 1 there is no refraction.
     pub(crate) const NO_BORDER: f32 = 1e-3;
 
+    /// The factor by which light that a coat reflects back down darkens the base: OpenPBR Surface 1.1 (Academy Software
+    /// Foundation, 2024), "Coat darkening". A share K of what leaves the base comes back, of which the base reflects its
+    /// albedo E: what remains of the first reflection is (1 − K) / (1 − E K).
+    fn darkened(&self) -> Spectrum {
+        let Clearcoat { weight, eta, darkening, .. } = self.coat;
+        if weight == 0.0 || darkening == 0.0 {
+            return Spectrum::WHITE;
+        }
+        let diffuse = self.base * (1.0 - self.diffuse_transmission)
+            + self.diffuse_transmission_color * self.diffuse_transmission;
+        let through = Spectrum::WHITE - self.f0;
+        let plastic = self.f0 + through * diffuse;
+        let clear = self.f0 + through * self.transmission_color;
+        let albedo = self.base.lerp(plastic.lerp(clear, self.transmission), 1.0 - self.metallic);
+        // Even light comes back by total reflection too; what a mirror sends up is reflected as it came in.
+        let mirrored = ALBEDO.face_mean(0.0, eta);
+        let even = 1.0 - (1.0 - mirrored) / (eta * eta);
+        let diffuse_share = (1.0 - self.metallic) * (1.0 - self.transmission);
+        let rough = diffuse_share + (1.0 - diffuse_share) * self.facets.alpha().x.min(1.0).sqrt();
+        let back = mirrored + (even - mirrored) * rough;
+        albedo.map(|e| {
+            let left = (1.0 - back) / (1.0 - crate::unit(e) * back);
+            1.0 + (left - 1.0) * darkening
+        })
+    }
+
     fn spread(&self) -> f32 {
         match self.body {
             Body::Solid { spread } => spread,
@@ -233,7 +276,14 @@ impl Principled {
             diffuse_transmission_color: colour_lane(self.diffuse_transmission_color),
             film: self.film.lane(),
             sheen: self.sheen.lane(),
-            coat: self.coat.lane(),
+            coat: ClearcoatLanes {
+                weight: self.coat.weight,
+                alpha: self.coat.alpha,
+                normal: lane(self.coat.normal),
+                eta: self.coat.eta,
+                absorption: colour_lane(self.coat.absorption()),
+                darkened: colour_lane(self.darkened()),
+            },
         }
     }
 
@@ -252,6 +302,9 @@ impl Principled {
         row.extend([self.sheen.roughness(), self.coat.weight, self.coat.alpha]);
         row.extend(self.coat.normal.to_array());
         row.extend(self.film.nm);
+        row.push(self.coat.eta);
+        row.extend(self.coat.absorption().to_array());
+        row.extend(self.darkened().to_array());
         row
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use lumbre_simd::math::sin_cos_turns;
+use lumbre_simd::math::{exp, sin_cos_turns};
 use lumbre_simd::{Mask, Real, Task, V3};
 
 use crate::albedo::{ALBEDO, MAX_ETA, unit};
@@ -63,13 +63,19 @@ pub struct ClearcoatLanes<R: Real> {
     pub alpha: R,
     /// Its normal in the shading frame.
     pub normal: V3<R>,
+    /// Its index of refraction.
+    pub eta: R,
+    /// The exponent of absorption along its normal, one way.
+    pub absorption: V3<R>,
+    /// A factor on the base where the coat covers it.
+    pub darkened: V3<R>,
 }
 
 impl<R: Real> ClearcoatLanes<R> {
     #[inline(always)]
     pub(crate) fn face(&self) -> DielectricLanes<R> {
         let facets = FacetLanes::new(self.alpha, self.alpha);
-        DielectricLanes { eta: R::splat(Clearcoat::ETA), facets }
+        DielectricLanes { eta: self.eta, facets }
     }
 
     #[inline(always)]
@@ -110,8 +116,16 @@ impl<R: Real> ClearcoatLanes<R> {
         if exists.none() {
             return R::zero();
         }
-        let face = ALBEDO.face(self.local(w).z.abs(), self.alpha, R::splat(Clearcoat::ETA));
+        let face = ALBEDO.face(self.local(w).z.abs(), self.alpha, self.eta);
         (self.weight * face).or_zero(exists)
+    }
+
+    /// How far light along a direction goes through the coat, in thicknesses.
+    #[inline(always)]
+    fn way(&self, w: V3<R>) -> R {
+        let z = self.local(w).z;
+        let sine2 = (R::one() - z * z) / (self.eta * self.eta);
+        (R::one() - sine2).simd_max(R::splat(1e-4)).sqrt().recip()
     }
 
     /// What the face reflects between two directions on the side that it is on, and the density of its samples. Where
@@ -209,15 +223,28 @@ impl<R: Real> PrincipledLanes<R> {
         along_o.simd_min(R::select(self.covered(wi), self.sheen.passes(wi), R::one()))
     }
 
-    /// The transmission of the coat towards `wo`, or where that is inside a solid, towards `wi`.
+    /// The transmission of the coat towards `wo`, or where that is inside a solid, towards `wi`; times its colour along
+    /// both, and what it darkens.
     #[inline(always)]
-    fn passes_coat(&self, wo: V3<R>, wi: V3<R>) -> R {
+    pub(crate) fn under_coat(&self, wo: V3<R>, wi: V3<R>) -> V3<R> {
+        let (zero, one) = (R::zero(), R::one());
         if self.coat.exists().none() {
-            return R::one();
+            return V3::splat(one);
         }
         let (above_o, above_i) = (self.covered(wo), self.covered(wi));
         let share = self.coat.share(V3::select(above_o, wo, wi));
-        R::one() - share.or_zero(above_o | above_i)
+        let passes = V3::splat(one - share.or_zero(above_o | above_i));
+        let ClearcoatLanes { weight, absorption, darkened, .. } = self.coat;
+        let least = darkened.x.simd_min(darkened.y).simd_min(darkened.z);
+        let is_tinted = absorption.max_component().simd_ne(zero) | least.simd_ne(one);
+        if is_tinted.none() {
+            return passes;
+        }
+        let way = self.coat.way(wo).or_zero(above_o) + self.coat.way(wi).or_zero(above_i);
+        let exponent = absorption * (-way);
+        let tint = V3::new(exp(exponent.x), exp(exponent.y), exp(exponent.z)) * darkened;
+        let tint = lerp(V3::splat(one), tint, weight);
+        V3::select(is_tinted, passes * tint, passes)
     }
 
     // Fresnel terms.
@@ -734,7 +761,7 @@ impl<R: Real> PrincipledLanes<R> {
         if has_coat.any() {
             let (value, face_pdf) = self.coat.eval(wo, wi);
             let own = (self.coat.weight * value).or_zero(has_coat & covered);
-            sum = sum * self.passes_coat(wo, wi) + V3::splat(own);
+            sum = sum * self.under_coat(wo, wi) + V3::splat(own);
             pdf = pdf + (lobes.coat * face_pdf).or_zero(lobes.coat.simd_gt(R::zero()));
         }
         (sum.or_zero(fits), pdf.or_zero(fits))
@@ -786,7 +813,7 @@ impl<R: Real> Task<R> for Eval<'_, R> {
 }
 
 impl<R: Real> LaneBsdf<R> for PrincipledLanes<R> {
-    const ROW: usize = 38;
+    const ROW: usize = 45;
 
     #[inline(always)]
     fn load(table: &[f32], at: R::UInt) -> Self {
@@ -794,6 +821,14 @@ impl<R: Real> LaneBsdf<R> for PrincipledLanes<R> {
         let mut nm = V3::splat(R::zero());
         if film.simd_ne(R::zero()).any() {
             nm = colour(table, at, 35);
+        }
+        let coat: R = field(table, at, 30);
+        let mut coat_eta = R::splat(Clearcoat::ETA);
+        let [mut absorption, mut darkened] = [V3::splat(R::zero()), V3::splat(R::one())];
+        if coat.simd_ne(R::zero()).any() {
+            coat_eta = field(table, at, 38);
+            absorption = colour(table, at, 39);
+            darkened = colour(table, at, 42);
         }
         Self {
             base: colour(table, at, 0),
@@ -817,9 +852,12 @@ impl<R: Real> LaneBsdf<R> for PrincipledLanes<R> {
             },
             sheen: SheenLanes { color: colour(table, at, 26), roughness: field(table, at, 29) },
             coat: ClearcoatLanes {
-                weight: field(table, at, 30),
+                weight: coat,
                 alpha: field(table, at, 31),
                 normal: colour(table, at, 32),
+                eta: coat_eta,
+                absorption,
+                darkened,
             },
         }
     }
@@ -854,8 +892,8 @@ impl<R: Real> LaneBsdf<R> for PrincipledLanes<R> {
             exists = exists & (!from_facets | sample.valid);
             delta = from_facets & sample.delta;
             if delta.any() {
-                let layers = self.passes_fibres(wo, sample.wi) * self.passes_coat(wo, sample.wi);
-                delta_weight = sample.weight * (layers / lobes.facets);
+                let layers = self.under_coat(wo, sample.wi) * self.passes_fibres(wo, sample.wi);
+                delta_weight = sample.weight * (layers / V3::splat(lobes.facets));
                 delta_transmits = sample.transmits;
                 delta_eta = sample.eta;
             }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use lumbre_math::{Elementary, Vec2, direction_at};
 
+use crate::albedo::MAX_ETA;
 use crate::material::albedo;
 use crate::medium::{HomogeneousMedium, albedo_of_many_collisions};
 use crate::microfacet::Microfacets;
@@ -104,6 +105,14 @@ pub struct PrincipledParams {
     pub clearcoat: Arc<FloatTexture>,
     /// The coat's roughness, in [0, 1]; α is the square. Default 0.
     pub clearcoat_roughness: Arc<FloatTexture>,
+    /// The coat's index of refraction, at least 1. Default 1.5.
+    pub clearcoat_ior: f32,
+    /// The colour of light that passes the coat twice along its normal, in [0, 1] (OpenPBR's `coat_color`). Default
+    /// white.
+    pub clearcoat_color: Arc<SpectrumTexture>,
+    /// How much light that the coat reflects back down darkens the base, in [0, 1] (OpenPBR's `coat_darkening`).
+    /// Default 0.
+    pub clearcoat_darkening: f32,
     /// The coat's tangent-space normal map. Default none: the surface without the base's bump map.
     pub clearcoat_normal: Option<ImageTexture>,
     /// Strength and colour of fibres on the base, in [0, 1] (KHR_materials_sheen). Default black: none.
@@ -141,9 +150,12 @@ impl Default for PrincipledParams {
             dispersion: 0.0,
             volume: None,
             diffuse_transmission: zero.clone(),
-            diffuse_transmission_color: white,
+            diffuse_transmission_color: white.clone(),
             clearcoat: zero.clone(),
             clearcoat_roughness: zero.clone(),
+            clearcoat_ior: Clearcoat::ETA,
+            clearcoat_color: white,
+            clearcoat_darkening: 0.0,
             clearcoat_normal: None,
             sheen_color: Arc::new(SpectrumTexture::Constant(Spectrum::BLACK)),
             sheen_tint: zero.clone(),
@@ -190,8 +202,13 @@ impl PrincipledParams {
 
     /// Whether it is uniform.
     pub(crate) fn is_uniform(&self) -> bool {
-        let colors =
-            [&self.base_color, &self.specular_color, &self.diffuse_transmission_color, &self.sheen_color];
+        let colors = [
+            &self.base_color,
+            &self.specular_color,
+            &self.diffuse_transmission_color,
+            &self.sheen_color,
+            &self.clearcoat_color,
+        ];
         let numbers = [
             &self.metallic,
             &self.roughness,
@@ -291,6 +308,7 @@ impl PrincipledParams {
             diffuse_transmission_color: colour(bsdf.diffuse_transmission_color),
             film: ThinFilm { nm: spectral.wavelengths.nm(), ..bsdf.film },
             sheen: bsdf.sheen.coloured(colour(bsdf.sheen.color)),
+            coat: Clearcoat { color: colour(bsdf.coat.color), ..bsdf.coat },
             eta,
             body,
             ..bsdf
@@ -323,6 +341,18 @@ impl PrincipledParams {
         };
         let weight = share(&self.clearcoat);
         let roughness = if weight > 0.0 { share(&self.clearcoat_roughness) } else { 0.0 };
+        let coat = if weight > 0.0 {
+            Clearcoat {
+                weight,
+                alpha: roughness * roughness,
+                eta: if self.clearcoat_ior >= 1.0 { self.clearcoat_ior.min(MAX_ETA) } else { 1.0 },
+                color: albedo(self.clearcoat_color.evaluate(at)),
+                darkening: crate::unit(self.clearcoat_darkening),
+                ..Clearcoat::NONE
+            }
+        } else {
+            Clearcoat::NONE
+        };
         let sheen = self.sheen_color.evaluate(at);
         let sheen = if sheen.is_black() {
             Sheen::NONE
@@ -359,7 +389,7 @@ impl PrincipledParams {
             diffuse_transmission_color: albedo(self.diffuse_transmission_color.evaluate(at)),
             film,
             sheen,
-            coat: Clearcoat { weight, alpha: roughness * roughness, ..Clearcoat::NONE },
+            coat,
         }
     }
 

@@ -102,7 +102,8 @@ fn principled() -> Vec<(&'static str, Principled)> {
     let solid = Principled { body: Body::Solid { spread: 0.0 }, ..pane };
     let film = ThinFilm { weight: 0.8, eta: 1.4, thickness: 380.0, ..ThinFilm::NONE };
     let sheen = Sheen::new(Spectrum::new(0.9, 0.3, 0.6), 0.4);
-    let coat = Clearcoat { weight: 0.7, alpha: 0.15, normal: Vec3::Z };
+    let coat = Clearcoat { weight: 0.7, alpha: 0.15, ..Clearcoat::NONE };
+    let amber = Clearcoat { eta: 1.8, color: Spectrum::new(1.0, 0.6, 0.1), darkening: 0.8, ..coat };
     let leaf = Principled {
         diffuse_transmission: 0.6,
         diffuse_transmission_color: Spectrum::new(0.4, 1.0, 0.2),
@@ -158,6 +159,9 @@ fn principled() -> Vec<(&'static str, Principled)> {
         ("coated plastic", Principled { coat, ..plastic }),
         ("polished coat", Principled { coat: Clearcoat { alpha: 0.0, ..coat }, ..metal }),
         ("coated solid", Principled { coat, ..solid }),
+        ("amber coat", Principled { coat: amber, ..plastic }),
+        ("amber solid", Principled { coat: amber, ..solid }),
+        ("polished amber", Principled { coat: Clearcoat { alpha: 0.0, ..amber }, ..metal }),
         ("everything", everything),
         ("everything solid", Principled { body: Body::Solid { spread: 0.03 }, ..everything }),
     ]
@@ -253,7 +257,8 @@ fn boundary(alpha: f32) -> Bsdf {
 
 /// A coat that leans.
 fn leaning() -> Principled {
-    let coat = Clearcoat { weight: 0.7, alpha: 0.15, normal: Vec3::new(0.3, -0.2, 0.9).normalize() };
+    let normal = Vec3::new(0.3, -0.2, 0.9).normalize();
+    let coat = Clearcoat { weight: 0.7, alpha: 0.15, normal, ..Clearcoat::NONE };
     Principled { coat, facets: Microfacets::new(0.3, 0.3), ..Principled::DEFAULT }
 }
 
@@ -876,6 +881,50 @@ fn white_dielectrics_give_everything_back_at_any_roughness() {
 }
 
 #[test]
+fn a_coloured_coat_tints_by_the_way_through_it() {
+    let color = Spectrum::new(1.0, 0.5, 0.25);
+    for eta in [1.3, 1.6, 2.5_f32] {
+        for cos in [1.0, 0.6, 0.2_f32] {
+            let coat = Clearcoat { weight: 1.0, eta, color, ..Clearcoat::NONE };
+            let base = Spectrum::splat(0.5);
+            let bsdf =
+                Principled { metallic: 1.0, base, facets: Microfacets::SMOOTH, coat, ..Principled::DEFAULT };
+            let wo = LocalDir::new(Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos));
+            let lobes = (0..2000).map(|k| (k as f32 + 0.5) / 2000.0);
+            let sum = lobes.fold(Spectrum::BLACK, |sum, lobe| {
+                let sample = bsdf.sample(wo, lobe, Vec2::splat(0.5)).expect("a mirror reflects");
+                sum + sample.weight
+            });
+            let face = fresnel::dielectric(cos, eta);
+            let metal = 0.5 + 0.5 * (1.0 - cos).powi(5);
+            let inside = (1.0 - (1.0 - cos * cos) / (eta * eta)).sqrt();
+            let expected = color.map(|c| face + (1.0 - face) * metal * c.powf(1.0 / inside));
+            let found = sum / 2000.0;
+            let away = (found - expected).map(f32::abs).max_component();
+            assert!(away < 0.012, "{eta} {cos}: {found:?}, not {expected:?}");
+        }
+    }
+}
+
+#[test]
+fn a_coat_darkens_grey_by_the_light_that_it_reflects_back_down() {
+    // A coat of index 1.5 reflects 0.0918 of even light from outside, so 1 - 0.9082 / 1.5² = 0.5963 from inside. Grey of
+    // 0.5 without reflections of its own keeps (1 - 0.5963) / (1 - 0.5 · 0.5963) = 0.5752 of itself.
+    let coat = Clearcoat { weight: 1.0, darkening: 1.0, ..Clearcoat::NONE };
+    let grey =
+        Principled { base: Spectrum::splat(0.5), f0: Spectrum::BLACK, f90: 0.0, coat, ..Principled::DEFAULT };
+    let up = LocalDir::new(Vec3::Z);
+    let (share, error) = even_furnace(&grey, up, GRID);
+    let expected = 0.04 + 0.96 * 0.5 * 0.5752;
+    assert!((share - expected).abs() < 0.004 + error, "{share}, not {expected}");
+    let half = Principled { coat: Clearcoat { weight: 0.5, ..coat }, ..grey };
+    let (share, error) = even_furnace(&half, up, GRID);
+    // Layers of one surface, not two surfaces side by side.
+    let expected = 0.02 + 0.98 * 0.5 * 0.5 * (1.0 + 0.5752);
+    assert!((share - expected).abs() < 0.004 + error, "{share}, not {expected}");
+}
+
+#[test]
 fn white_layers_make_no_light_and_a_coat_loses_none() {
     let mut count = 0;
     for roughness in ROUGHNESSES {
@@ -883,11 +932,13 @@ fn white_layers_make_no_light_and_a_coat_loses_none() {
         for metallic in [0.0, 1.0] {
             let base = Principled { metallic, facets: Microfacets::new(0.09, 0.09), ..Principled::DEFAULT };
             let coat = Principled { coat: Clearcoat { weight: 1.0, alpha, ..Clearcoat::NONE }, ..base };
+            let dense = Clearcoat { eta: 2.5, darkening: 1.0, ..coat.coat };
             let cloth = Principled { sheen: Sheen::new(Spectrum::WHITE, roughness), ..base };
-            for (name, bsdf) in [("coat", coat), ("cloth", cloth)] {
+            let list = [("coat", coat), ("dense coat", Principled { coat: dense, ..base }), ("cloth", cloth)];
+            for (name, bsdf) in list {
                 for wo in views() {
                     let share = even_furnace(&bsdf, wo, GRID);
-                    let least = if name == "coat" { 0.995 } else { 0.6 };
+                    let least = if name.ends_with("coat") { 0.995 } else { 0.6 };
                     assert!(
                         within(share, least),
                         "{name} {roughness} {metallic} from {:?}: {share:?}",
@@ -898,7 +949,7 @@ fn white_layers_make_no_light_and_a_coat_loses_none() {
             }
         }
     }
-    assert_eq!(count, 7 * 2 * 2 * 7);
+    assert_eq!(count, 7 * 2 * 3 * 7);
 }
 
 #[test]
@@ -1452,6 +1503,9 @@ fn random_principled(random: &mut RandomStream) -> Principled {
             weight: coat,
             alpha: (2.0 * random.next_f32() - 1.0).max(0.0),
             normal: if leans > 0.5 { normal } else { Vec3::Z },
+            eta: 1.0 + 2.0 * random.next_f32(),
+            color: if random.next_f32() > 0.5 { random_colour(random) } else { Spectrum::WHITE },
+            darkening: (2.0 * random.next_f32() - 1.0).max(0.0),
         },
     }
 }

@@ -301,6 +301,7 @@ impl Session {
             shape: wanted.shape.clone(),
             all_shapes: wanted.all_shapes,
             only: wanted.only.clone(),
+            digits: lumbre_cli::Digits::Full,
         };
         // As the program: what is explained is a path of red, green and blue.
         let mut options = self.options.clone();

@@ -24,7 +24,8 @@ use crate::colour;
 ///   exposure.
 ///
 /// Values are numbers, colours (one number, three separated by commas, a name such as `red`, or `#rrggbb` in sRGB) or
-/// points. The error for an unknown parameter lists the known ones.
+/// points. `color`, or `colour`, is the main colour of a material (its `reflectance`, `base_color` or `Kd`) and that of
+/// a light. The error for an unknown parameter lists the known ones.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     of: Owner,
@@ -67,7 +68,9 @@ impl FromStr for Setting {
             None if is_one => ("", rest),
             None => return Err(wrong()),
         };
-        let (parameter, value) = (parameter.trim().to_owned(), value.trim().to_owned());
+        // Either spelling.
+        let parameter = parameter.trim().replace("colour", "color");
+        let value = value.trim().to_owned();
         if parameter.is_empty() || value.is_empty() || (of == Owner::Film && !name.is_empty()) {
             return Err(wrong());
         }
@@ -184,7 +187,8 @@ impl Setting {
             return Err(self.missing("light", &names));
         };
         let mut light = &mut desc.lights[index];
-        if ["intensity", "irradiance", "radiance"].contains(&&*self.parameter) {
+        let is_color = self.parameter == "color";
+        if is_color || ["intensity", "irradiance", "radiance"].contains(&&*self.parameter) {
             // The colour replaces the spectrum.
             *light = light.bare().clone();
         }
@@ -219,7 +223,13 @@ impl Setting {
             }
             return Ok(());
         }
-        let slot = match (light, &*self.parameter) {
+        let parameter = match light {
+            _ if !is_color => &*self.parameter,
+            LightDesc::Distant { .. } | LightDesc::Disc { .. } => "irradiance",
+            LightDesc::Infinite { .. } | LightDesc::Portal { .. } => "radiance",
+            _ => "intensity",
+        };
+        let slot = match (light, parameter) {
             (LightDesc::Point { from, .. }, "from") => Slot::Point(from),
             (
                 LightDesc::Point { intensity, .. }
@@ -413,6 +423,9 @@ pub(crate) enum Slot<'a> {
     Point(&'a mut DVec3),
 }
 
+/// The names of the main colour of most materials.
+const REFLECTANCE: [&str; 2] = ["reflectance", "color"];
+
 /// Calls `visit` for each parameter of a material that settings change, with its names: that of the scene language or
 /// of [`PrincipledParams`], then aliases.
 ///
@@ -423,10 +436,10 @@ pub(crate) fn each_material_slot(
 ) {
     use MaterialKind as Kind;
     match kind {
-        Kind::Diffuse { reflectance } => visit(&["reflectance"], Slot::Colour(reflectance)),
+        Kind::Diffuse { reflectance } => visit(&REFLECTANCE, Slot::Colour(reflectance)),
         Kind::Conductor { roughness, .. } => roughness_slots(roughness, visit),
         Kind::ConductorReflectance { reflectance, roughness } => {
-            visit(&["reflectance"], Slot::Colour(reflectance));
+            visit(&REFLECTANCE, Slot::Colour(reflectance));
             roughness_slots(roughness, visit);
         }
         Kind::Dielectric { eta, roughness } => {
@@ -435,7 +448,7 @@ pub(crate) fn each_material_slot(
         }
         Kind::ThinDielectric { eta } => visit(&["eta"], Slot::Plain(eta, INDEX)),
         Kind::CoatedDiffuse { reflectance, roughness, thickness, eta, g, albedo, .. } => {
-            visit(&["reflectance"], Slot::Colour(reflectance));
+            visit(&REFLECTANCE, Slot::Colour(reflectance));
             roughness_slots(roughness, visit);
             visit(&["thickness"], Slot::Number(thickness, FROM_ZERO));
             visit(&["eta"], Slot::Plain(eta, INDEX));
@@ -453,7 +466,7 @@ pub(crate) fn each_material_slot(
             ..
         } => {
             if let Metal::Reflectance(reflectance) = metal {
-                visit(&["reflectance"], Slot::Colour(reflectance));
+                visit(&REFLECTANCE, Slot::Colour(reflectance));
             }
             visit(&["roughness"], Slot::Roughness(roughness));
             visit(&["interface_roughness"], Slot::Roughness(interface_roughness));
@@ -463,13 +476,13 @@ pub(crate) fn each_material_slot(
             visit(&["albedo"], Slot::Colour(albedo));
         }
         Kind::DiffuseTransmission { reflectance, transmittance, scale } => {
-            visit(&["reflectance"], Slot::Colour(reflectance));
+            visit(&REFLECTANCE, Slot::Colour(reflectance));
             visit(&["transmittance"], Slot::Colour(transmittance));
             visit(&["scale"], Slot::Plain(scale, FROM_ZERO));
         }
         Kind::Principled(params) => principled_slots(params, visit),
         Kind::Uber(params) => {
-            visit(&["Kd"], Slot::Colour(&mut params.kd));
+            visit(&["Kd", "color"], Slot::Colour(&mut params.kd));
             visit(&["Ks"], Slot::Colour(&mut params.ks));
             visit(&["Kr"], Slot::Colour(&mut params.kr));
             visit(&["Kt"], Slot::Colour(&mut params.kt));
@@ -480,7 +493,7 @@ pub(crate) fn each_material_slot(
         Kind::Hair(params) => {
             match &mut params.colour {
                 HairColour::Absorption(_) => {}
-                HairColour::Reflectance(colour) => visit(&["reflectance"], Slot::Colour(colour)),
+                HairColour::Reflectance(colour) => visit(&REFLECTANCE, Slot::Colour(colour)),
                 HairColour::Melanin { eumelanin, pheomelanin } => {
                     visit(&["eumelanin"], Slot::Number(eumelanin, FROM_ZERO));
                     visit(&["pheomelanin"], Slot::Number(pheomelanin, FROM_ZERO));
@@ -509,7 +522,7 @@ fn roughness_slots(roughness: &mut Roughness, visit: &mut dyn FnMut(&'static [&'
 }
 
 fn principled_slots(params: &mut PrincipledParams, visit: &mut dyn FnMut(&'static [&'static str], Slot<'_>)) {
-    visit(&["base_color"], Slot::Colour(&mut params.base_color));
+    visit(&["base_color", "color"], Slot::Colour(&mut params.base_color));
     visit(&["metallic"], Slot::Number(&mut params.metallic, UNIT));
     visit(&["roughness"], Slot::Number(&mut params.roughness, UNIT));
     visit(&["anisotropy", "anisotropic"], Slot::Number(&mut params.anisotropy, UNIT));
@@ -521,6 +534,8 @@ fn principled_slots(params: &mut PrincipledParams, visit: &mut dyn FnMut(&'stati
     visit(&["diffuse_transmission_color"], Slot::Colour(&mut params.diffuse_transmission_color));
     visit(&["clearcoat"], Slot::Number(&mut params.clearcoat, UNIT));
     visit(&["clearcoat_roughness"], Slot::Number(&mut params.clearcoat_roughness, UNIT));
+    visit(&["clearcoat_color", "coat_color"], Slot::Colour(&mut params.clearcoat_color));
+    visit(&["clearcoat_ior", "coat_ior"], Slot::Plain(&mut params.clearcoat_ior, Range(1.0, 4.0)));
     visit(&["sheen_color"], Slot::Colour(&mut params.sheen_color));
     visit(&["sheen_roughness"], Slot::Number(&mut params.sheen_roughness, UNIT));
     visit(&["iridescence"], Slot::Number(&mut params.iridescence, UNIT));
@@ -592,6 +607,48 @@ mod tests {
             },
             _ => panic!("not diffuse"),
         }
+    }
+
+    #[test]
+    fn the_main_colour_of_everything_is_its_color_by_name_or_code() {
+        for (material, names) in [
+            ("diffuse", &["reflectance"][..]),
+            ("coateddiffuse", &["reflectance", "albedo"]),
+            ("diffusetransmission", &["reflectance", "transmittance"]),
+            ("principled", &["base_color", "base_colour", "sheen_colour", "diffuse_transmission_color"]),
+            ("uber", &["Kd", "Ks", "Kr", "Kt", "opacity"]),
+        ] {
+            let mut desc = scene(&format!("Material \"{material}\" Shape \"sphere\""));
+            for name in names.iter().chain(&["color", "colour"]) {
+                for value in ["red", "#ff8800", "#F80", "0.25", "0.1,0.2,0.3"] {
+                    assert_eq!(
+                        set(&mut desc, &format!("material.0.{name}={value}")),
+                        Ok(()),
+                        "{material} {name}"
+                    );
+                }
+                assert!(set(&mut desc, &format!("material.0.{name}=reddish")).is_err());
+            }
+        }
+        let mut desc =
+            scene("MakeNamedMaterial \"m\" \"string type\" \"diffuse\" NamedMaterial \"m\" Shape \"sphere\"");
+        set(&mut desc, "material.m.colour=#ff0000").unwrap();
+        assert_eq!(diffuse(&desc, "m"), Spectrum::new(1.0, 0.0, 0.0));
+        let lights = ["point", "spot", "distant", "infinite"];
+        let mut desc = scene(&lights.map(|light| format!("LightSource \"{light}\"")).concat());
+        for (i, light) in lights.iter().enumerate() {
+            assert_eq!(set(&mut desc, &format!("light.{i}.colour=lime")), Ok(()), "{light}");
+            let (LightDesc::Point { intensity: colour, .. }
+            | LightDesc::Spot { intensity: colour, .. }
+            | LightDesc::Distant { irradiance: colour, .. }
+            | LightDesc::Infinite { radiance: colour, .. }) = &desc.lights[i]
+            else {
+                panic!("{light}")
+            };
+            assert_eq!(*colour, Rgb::new(0.0, 1.0, 0.0), "{light}");
+        }
+        let refused = set(&mut desc, "light.0.scale=red").unwrap_err();
+        assert!(refused.contains("a number from 0 up"), "{refused}");
     }
 
     #[test]

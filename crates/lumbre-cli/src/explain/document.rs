@@ -60,6 +60,8 @@ pub(super) struct Quantity {
     /// The formula with its numbers, if any.
     pub(super) numbers: Option<PutIn>,
     pub(super) value: Value,
+    /// Whether digits of the value are left out.
+    pub(super) is_rounded: bool,
     pub(super) schoolbook: Option<Textbook>,
 }
 
@@ -230,6 +232,9 @@ impl Quantity {
             }
             parts.push((&numbers.written, numbers.sign_after()));
         }
+        if let Some(last) = parts.last_mut().filter(|_| self.is_rounded) {
+            last.1 = "≈";
+        }
         parts
     }
 }
@@ -267,6 +272,7 @@ impl Section {
             formula: String::new(),
             numbers: None,
             value: value.into(),
+            is_rounded: false,
             schoolbook: None,
         }));
     }
@@ -287,6 +293,7 @@ impl Section {
             formula: formula.to_owned(),
             numbers: numbers(scope, formula, &value),
             value: value.clone(),
+            is_rounded: false,
             schoolbook: None,
         }));
         scope.set(symbol, &value);

@@ -14,6 +14,7 @@ use crate::units;
 
 mod along;
 mod camera;
+mod digits;
 mod document;
 mod english;
 mod equation;
@@ -37,6 +38,8 @@ mod texts;
 mod things;
 mod writing;
 
+pub use digits::Digits;
+use digits::digits;
 use document::Section;
 use english::ENGLISH;
 use question::Question;
@@ -80,6 +83,9 @@ pub struct Request {
     /// radiance, …
     #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
     pub only: Vec<String>,
+    /// Digits of the numbers: full, or at most this many, such as 6. JSON always has all.
+    #[arg(long, value_name = "N|full", default_value = "full", value_parser = digits)]
+    pub digits: Digits,
 }
 
 /// The format of an explanation.
@@ -147,6 +153,9 @@ pub fn explain(
     let mut sections = told(request, scene, options, things)?;
     if !request.only.is_empty() {
         sections = only(sections, &request.only, texts(request.lang))?;
+    }
+    if request.format != Format::Json {
+        sections = sections.into_iter().map(|section| request.digits.rounded(section)).collect();
     }
     Ok(written(request, name, &sections))
 }

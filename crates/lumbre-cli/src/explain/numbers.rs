@@ -12,15 +12,18 @@ pub(super) fn exact(x: f64) -> String {
 
 /// With six digits, for what stands in formulas.
 pub(super) fn short(x: f64) -> String {
+    exact(rounded(x, 6))
+}
+
+/// The number of at most this many digits that is nearest.
+pub(super) fn rounded(x: f64, digits: usize) -> f64 {
     if x == 0.0 || !x.is_finite() {
-        return exact(x);
+        return x;
     }
-    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    exact(rounded)
+    format!("{x:.0$e}", digits.saturating_sub(1)).parse().unwrap_or(x)
 }
 
 /// With four digits, for a label.
 pub(super) fn label(x: f64) -> String {
-    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
-    exact(rounded)
+    exact(rounded(x, 4))
 }

@@ -33,7 +33,7 @@ use crate::view::ViewArguments;
   lumbre explain scene.pbrt --ray 0,2,-5,0,0,1 --shape sphere     why the ray misses it
   lumbre explain scene.pbrt --pixel 320,240 --only equation,radiance
   lumbre explain scene.pbrt --pixel 320,240 --format html -o pixel.html
-  lumbre explain scene.pbrt --pixel 320,240 --sample 7 --depth 2
+  lumbre explain scene.pbrt --pixel 320,240 --sample 7 --depth 2 --digits 6
   lumbre explain scene.pbrt --pixel 320,240 --format markdown --lang es
   lumbre explain model.glb --pixel 100,80 --size 200x160 --format json | jq .")]
 pub(crate) struct Arguments {

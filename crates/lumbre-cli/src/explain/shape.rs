@@ -79,6 +79,7 @@ fn tell_step(
             numbers: numbers(scope, &formula, &value),
             formula,
             value: value.clone(),
+            is_rounded: false,
             schoolbook: theirs,
         }));
         scope.set(&symbol, &value);

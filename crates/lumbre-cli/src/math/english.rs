@@ -7,7 +7,7 @@ pub(super) static ENGLISH: Texts = Texts {
     vector: "a vector",
     vector_of: "a vector of {0}",
     vector_2_or_3: "a vector of 2 or 3",
-    vector_or_quaternion: "a vector of 2 or 3, or a quaternion",
+    measured: "a number, a vector or a quaternion; det(M) is the determinant",
     matrix: "a matrix",
     matrix_of: "a {0}×{1} matrix",
     square_matrix: "a square matrix of size 1 to 4",
@@ -15,14 +15,17 @@ pub(super) static ENGLISH: Texts = Texts {
     transform_or_quaternion: "a transform or a quaternion",
     quaternion: "a quaternion",
     unknown_character: "this is no part of an expression",
-    characters: "a number, a name, a bracket or one of + - * / ^ = , ;",
+    characters: "a number, a name, a bracket or one of + - * / ^ = , ; | °",
     not_a_number: "this is not a number",
-    number_form: "a number such as 2, 0.5 or 1e-3, and * between factors",
+    number_form: "a number such as 2, 0.5 or 1e-3",
     unexpected: "unexpected here",
     end: "the end",
-    operand: "a number, a name, \"(\" or \"[\"",
+    operand: "a number, a name, \"(\", \"[\" or \"|\"",
     operator_or_end: "one of + - * / ^, or \";\" before another expression",
     operator_or_parenthesis: "one of + - * / ^, or \")\"",
+    operator_or_bar: "one of + - * / ^, or \"|\"",
+    two_readings: "after / and ^ a product without * can be read in two ways",
+    one_reading: "parentheses, as in 1/(2*x) or (1/2)*x",
     no_tuple: "\")\"; a vector is written [1, 2, 3]",
     comma_or_bracket: "\",\" or \"]\"",
     comma_or_parenthesis: "\",\" or \")\"",
@@ -69,7 +72,9 @@ pub(super) static ENGLISH: Texts = Texts {
     opening: "an angle between 0 and 180 degrees",
     above_0: "more than 0",
     beyond_near: "more than near",
-    rotation_matrix: "a rotation: orthonormal, with determinant 1",
+    rotation_matrix: "a rotation: orthonormal within 1e-6, with determinant 1",
+    no_real_eigenvalue: "no eigenvalue is real, and the result is a vector of real ones",
+    real_eigenvalue: "a matrix with a real eigenvalue, such as a symmetric one or one of 3 rows",
     acute: "> 0: the angle is less than 90°",
     obtuse: "< 0: the angle is more than 90°",
     right_angle: "= 0: perpendicular, or one is zero",
@@ -99,6 +104,7 @@ pub(super) static ENGLISH: Texts = Texts {
     depth_range: "after division by w = -z: z = -near to -1, z = -far to 1",
     depth_is_lost: "singular: the depth is lost",
     largest_part: "the largest part by a square root, the others by division (Shepperd 1978)",
+    nearly_rotation: "a rotation with rounded entries: RᵀR differs from I by {0}; the quaternion is given length 1",
     heading: "heading",
     attitude: "attitude",
     bank: "bank",
@@ -107,6 +113,12 @@ pub(super) static ENGLISH: Texts = Texts {
     by_cofactors: "M⁻¹ = Cᵀ / det M,  Cij = (-1)^(i+j) times the determinant without row i and column j",
     affine_inverse: "the map p' = L p + t goes back by p = L⁻¹ p' - L⁻¹ t",
     nearly_singular: "nearly singular: rows of these lengths allow a determinant 1/{0} times as large; the last digits of the entries decide",
+    all_zero: "all entries are 0",
+    some_minor: "rows {0} and columns {1} are independent, for their determinant is not 0:",
+    no_minor: "every determinant of {0} rows and {0} columns is 0, exactly",
+    characteristic: "M v = λ v for some v that is not 0: λ is a root of the characteristic polynomial",
+    symmetric: "symmetric: all eigenvalues are real",
+    only_real: "the result has the real ones",
     no_solution: "M x = b has no solution: its equations contradict one another",
     many_solutions: "M x = b has more than one solution: its equations are not independent",
     divided_by_square: "q = (a, b, c, d), divided by |q|²:",
@@ -136,12 +148,14 @@ pub(super) static ENGLISH: Texts = Texts {
     not_utf8: "not text in UTF-8",
     not_regular: "not a regular file",
     too_long: "an expression of {0} bytes or more (--file reads any length)",
+    also: " (also called {0})",
     language: "\
-numbers        1  -0.5  1e-3  pi; angles are in degrees
+numbers        1  -0.5  1e-3  pi; angles are in degrees, and 30° is 30
 vectors        [1, 2, 3] of 1 to 4 numbers; x, y, z are the axes
 matrices       [[1, 2], [3, 4]], row by row
 quaternions    quat(w, x, y, z), or 1 + 2*i + 3*j + 4*k
-operators      + - * / ^; M * p, A * B (first B), v * M (a row), M^-1, M^3
+operators      + - * / ^; 2x and 2(a + b) without *; |v| is length(v)
+products       M * p, A * B (first B), v * M (a row), M^-1, M^3
 names          a = ...; the last result is ans
 statements     on lines of their own, or with ; between; # begins a comment
 help NAME      one function
@@ -151,7 +165,7 @@ help NAME      one function
         ("cross", "the cross product"),
         ("cross_matrix", "the matrix [a]× whose product with b is a×b"),
         ("mixed", "the mixed product a·(b×c), a volume and a determinant"),
-        ("length", "the length of a vector or a quaternion"),
+        ("length", "the length of a vector or a quaternion, the size of a number"),
         ("unit", "the same direction with length 1; also of a quaternion"),
         ("angle", "the angle in degrees, accurate also where it is small"),
         ("project", "the part of b that is parallel to a"),
@@ -179,6 +193,11 @@ help NAME      one function
         ("inverse", "the inverse of a matrix, a transform or a quaternion"),
         ("transpose", "the transpose"),
         ("det", "the determinant"),
+        ("rank", "how many rows, and how many columns, are independent"),
+        (
+            "eigenvalues",
+            "the real λ with M v = λ v for some v, in ascending order; the steps show complex ones",
+        ),
         ("solve", "the x with M x = b, by Cramer's rule, for 1 to 4 unknowns"),
         ("matrix", "the 4×4 matrix of a transform, or the 3×3 matrix of a quaternion"),
         ("linear", "the 3×3 block of a transform"),

@@ -43,8 +43,31 @@ pub(super) fn all() -> impl Iterator<Item = &'static Function> {
     topics.into_iter().flatten()
 }
 
-pub(super) fn find(name: &str) -> Option<&'static Function> {
+/// Names of other programs for functions.
+pub(super) const SYNONYMS: [(&str, &[&str]); 12] = [
+    ("unit", &["normalize", "normalise", "normalized", "normalised"]),
+    ("length", &["norm", "magnitude", "mag", "abs"]),
+    ("inverse", &["inv", "invert"]),
+    ("transpose", &["transposed"]),
+    ("det", &["determinant"]),
+    ("look_at", &["lookat"]),
+    ("ortho", &["orthographic"]),
+    ("project", &["projection", "proj"]),
+    ("rotate", &["rotation", "rot", "axis_angle"]),
+    ("translate", &["translation"]),
+    ("quat", &["quaternion"]),
+    ("camera_ray", &["ray"]),
+];
+
+/// The function of this name.
+pub(super) fn named(name: &str) -> Option<&'static Function> {
     all().find(|function| function.name == name)
+}
+
+/// The function of this name or synonym.
+pub(super) fn find(name: &str) -> Option<&'static Function> {
+    let synonym = || SYNONYMS.iter().find(|(_, words)| words.contains(&name)).map(|(name, _)| *name);
+    named(name).or_else(|| named(synonym()?))
 }
 
 /// How a function is called: `rotate(degrees) or rotate(axis, degrees)`.
@@ -56,7 +79,12 @@ pub(super) fn forms(name: &str) -> String {
 
 /// What functions there are, or what one of them does.
 pub(super) fn help(topic: Option<&Function>, texts: &Texts) -> Vec<String> {
-    let line = |function: &Function| format!("{}\n    {}", forms(function.name), texts.about(function.name));
+    let line = |function: &Function| {
+        let synonyms = SYNONYMS.iter().find(|(name, _)| *name == function.name);
+        let synonyms = synonyms.map(|(_, words)| filled(texts.also, &[&words.join(", ")]));
+        let about = texts.about(function.name);
+        format!("{}\n    {about}{}", forms(function.name), synonyms.unwrap_or_default())
+    };
     match topic {
         Some(function) => line(function).lines().map(str::to_owned).collect(),
         None => {

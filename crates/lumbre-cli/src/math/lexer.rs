@@ -21,7 +21,7 @@ impl Wrong {
 pub(super) enum TokenKind {
     Number(f64),
     Name(String),
-    /// One of `+ - * / ^ = ( ) [ ] ,`.
+    /// One of `+ - * / ^ = ( ) [ ] , | °`.
     Symbol(char),
     /// The end of a statement: `;` or the end of a line outside of brackets.
     Break,
@@ -34,6 +34,8 @@ pub(super) struct Token {
     pub(super) kind: TokenKind,
     /// The byte where it begins.
     pub(super) offset: usize,
+    /// Whether nothing separates it from the token before.
+    pub(super) is_adjacent: bool,
 }
 
 /// Cuts a text into tokens, one at a time.
@@ -52,13 +54,20 @@ impl<'a> Lexer<'a> {
 
     /// The next token.
     pub(super) fn next(&mut self) -> Result<Token, Wrong> {
+        let end = self.at;
         self.skip_space();
         let offset = self.at;
+        let is_adjacent = offset == end;
         let Some(c) = self.text[self.at..].chars().next() else {
-            return Ok(Token { kind: TokenKind::End, offset });
+            return Ok(Token { kind: TokenKind::End, offset, is_adjacent });
         };
         let kind = match c {
             '0'..='9' | '.' => self.number()?,
+            // Spanish keyboards have the ordinal, which is a letter.
+            '°' | 'º' => {
+                self.at += c.len_utf8();
+                TokenKind::Symbol('°')
+            }
             c if begins_name(c) => {
                 let name = self.take_while(|c| begins_name(c) || c.is_ascii_digit());
                 TokenKind::Name(name.to_owned())
@@ -67,7 +76,7 @@ impl<'a> Lexer<'a> {
                 self.at += 1;
                 TokenKind::Break
             }
-            '+' | '-' | '*' | '/' | '^' | '=' | '(' | ')' | '[' | ']' | ',' => {
+            '+' | '-' | '*' | '/' | '^' | '=' | '(' | ')' | '[' | ']' | ',' | '|' => {
                 self.at += 1;
                 match c {
                     '(' | '[' => self.open += 1,
@@ -84,7 +93,7 @@ impl<'a> Lexer<'a> {
                 ));
             }
         };
-        Ok(Token { kind, offset })
+        Ok(Token { kind, offset, is_adjacent })
     }
 
     /// Spaces, comments, and ends of lines within brackets.
@@ -108,14 +117,17 @@ impl<'a> Lexer<'a> {
 
     fn number(&mut self) -> Result<TokenKind, Wrong> {
         let start = self.at;
-        // Letters as well, so that `2x` is said to be wrong as a whole; a sign belongs to it after an e.
-        let mut last = ' ';
-        let written = self.take_while(|c| {
-            let is_sign = (c == '+' || c == '-') && (last == 'e' || last == 'E');
-            let belongs = c.is_ascii_digit() || c == '.' || begins_name(c) || is_sign;
-            last = c;
-            belongs
-        });
+        self.take_while(|c| c.is_ascii_digit() || c == '.');
+        // An e without an exponent is a name.
+        let rest = &self.text[self.at..];
+        if let Some(exponent) = rest.strip_prefix(['e', 'E'])
+            && exponent.strip_prefix(['+', '-']).unwrap_or(exponent).starts_with(|c: char| c.is_ascii_digit())
+        {
+            self.at += rest.len() - exponent.len();
+            self.take_while(|c| c == '+' || c == '-');
+            self.take_while(|c| c.is_ascii_digit());
+        }
+        let written = &self.text[start..self.at];
         match written.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(TokenKind::Number(number)),
             _ => {
@@ -126,8 +138,9 @@ impl<'a> Lexer<'a> {
     }
 }
 
+/// Letters of any alphabet; the ordinal stands for degrees.
 fn begins_name(c: char) -> bool {
-    c.is_ascii_alphabetic() || c == '_'
+    c.is_alphabetic() && c != 'º' || c == '_'
 }
 
 /// How many brackets are open after a line that begins with `open` of them: more lines belong to it. 0 after a mistake.

@@ -16,6 +16,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function::new("inverse", &["M"], inverse),
     Function::new("transpose", &["M"], transpose),
     Function::new("det", &["M"], det),
+    Function::new("rank", &["M"], rank),
+    Function::new("eigenvalues", &["M"], eigenvalues),
     Function::new("solve", &["M, b"], solve),
     Function::new("matrix", &["T"], as_matrix),
     Function::new("linear", &["T"], linear),
@@ -249,6 +251,111 @@ pub(super) fn show_unit_product(m: &Matrix, inverse: &Matrix, work: &mut Work) {
     let is_unit = product == Matrix::from_fn(m.rows, m.columns, |i, j| f64::from(u8::from(i == j)));
     work.line(if is_unit { "M M⁻¹ = I" } else { "M M⁻¹ ≈ I" });
     work.beside(&[m.into(), inverse.into(), "=".into(), (&product).into()]);
+}
+
+/// Numbers from 0 on as places from 1 on: `1, 3`.
+fn places(of: &[usize]) -> String {
+    of.iter().map(|i| (i + 1).to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// All choices of this many of the numbers below `count`, in order.
+fn choices(count: usize, chosen: usize) -> Vec<Vec<usize>> {
+    let sets = (0_u32..1 << count).filter(|set| set.count_ones() as usize == chosen);
+    let mut all: Vec<Vec<usize>> =
+        sets.map(|set| (0..count).filter(|i| set >> i & 1 == 1).collect()).collect();
+    all.sort();
+    all
+}
+
+fn rank(call: &mut Call) -> Result<Value, Wrong> {
+    let m = call.matrix(0)?;
+    let texts = call.work.texts;
+    let most = m.rows.min(m.columns);
+    let part = |rows: &[usize], columns: &[usize]| {
+        Matrix::from_fn(rows.len(), columns.len(), |i, j| m.cells[rows[i]][columns[j]])
+    };
+    // The rank is the size of the largest part with a determinant that is not 0.
+    let largest = (1..=most).rev().find_map(|size| {
+        let columns = choices(m.columns, size);
+        choices(m.rows, size).into_iter().find_map(|rows| {
+            let columns = columns.iter().find(|columns| !is_singular(&part(&rows, columns)))?;
+            Some((rows, columns.clone()))
+        })
+    });
+    let Some((rows, columns)) = largest else {
+        call.work.line(texts.all_zero);
+        return Ok(Value::Number(0.0));
+    };
+    let (rank, minor) = (rows.len(), part(&rows, &columns));
+    let value = format!("= {}", written_determinant(&minor));
+    call.work.line(filled(texts.some_minor, &[&places(&rows), &places(&columns)]));
+    call.work.beside(&["det".into(), (&minor).into(), value.into()]);
+    if rank < most {
+        call.work.line(filled(texts.no_minor, &[&(rank + 1).to_string()]));
+    }
+    if let Some(line) = nearly_singular(&minor, call.work) {
+        call.work.line(line);
+    }
+    Ok(Value::Number(rank as f64))
+}
+
+/// `λ² - 4 λ + 3`, from the coefficient of the highest power down, which is 1.
+fn written_polynomial(coefficients: &[f64]) -> String {
+    let degree = coefficients.len() - 1;
+    let mut written = String::new();
+    for (i, c) in coefficients.iter().enumerate().filter(|(_, c)| **c != 0.0) {
+        let power = ["", "λ", "λ²", "λ³", "λ⁴"][degree - i];
+        let sign = match (i, *c < 0.0) {
+            (0, _) => "",
+            (_, true) => " - ",
+            (_, false) => " + ",
+        };
+        let size = number(c.abs());
+        written += &match (power, c.abs() == 1.0) {
+            ("", _) => format!("{sign}{size}"),
+            (_, true) => format!("{sign}{power}"),
+            (_, false) => format!("{sign}{size} {power}"),
+        };
+    }
+    written
+}
+
+fn eigenvalues(call: &mut Call) -> Result<Value, Wrong> {
+    let m = square(call, 0)?;
+    let texts = call.work.texts;
+    let (coefficients, all) = of_size!(&m, rows => {
+        (exact::characteristic_polynomial(&rows), exact::eigenvalues(&rows).unwrap_or_default())
+    });
+    call.work.line(texts.characteristic);
+    if let Some(coefficients) = coefficients.filter(|all| all.iter().all(|c| c.is_finite())) {
+        call.work.line(format!("det(λ I - M) = {} = 0", written_polynomial(&coefficients)));
+    }
+    if m.rows > 1 && m == m.transpose() {
+        call.work.line(texts.symmetric);
+    }
+    if m.rows == 2 {
+        let [[a, b], [c, d]] =
+            [[m.cells[0][0], m.cells[0][1]], [m.cells[1][0], m.cells[1][1]]].map(|row| row.map(factor));
+        call.work.line("λ = (m11 + m22)/2 ± √(((m11 - m22)/2)² + m12 m21)");
+        call.work.line(format!("= ({a} + {d})/2 ± √((({a} - {d})/2)² + {b}·{c})"));
+    }
+    for (i, value) in all.real.iter().enumerate() {
+        call.work.line(format!("λ{} = {}", i + 1, number(*value)));
+    }
+    let pair = |[a, b]: [f64; 2]| format!("{} ± {} i", number(a), number(b));
+    for (i, values) in all.pairs.iter().enumerate() {
+        let first = all.real.len() + 2 * i + 1;
+        call.work.line(format!("λ{first}, λ{} = {}", first + 1, pair(*values)));
+    }
+    if all.real.is_empty() {
+        let found: Vec<String> = all.pairs.into_iter().map(pair).collect();
+        let what = Diagnostic::error(texts.no_real_eigenvalue).found(found.join(", "));
+        return Err(Wrong::new(call.offset(), what.expected(texts.real_eigenvalue)));
+    }
+    if !all.pairs.is_empty() {
+        call.work.line(texts.only_real);
+    }
+    Ok(Value::Vector(all.real))
 }
 
 fn solve(call: &mut Call) -> Result<Value, Wrong> {

@@ -3,6 +3,8 @@
 use lumbre::math::quaternion::{self, Euler};
 use lumbre::math::{DQuat, Elementary, vector};
 
+use crate::language::filled;
+
 use super::functions::{Call, Function};
 use super::lexer::Wrong;
 use super::steps::{Work, factor};
@@ -16,6 +18,11 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function::new("euler", &["heading, attitude, bank", "angles"], euler),
     Function::new("angles", &["q"], angles),
 ];
+
+/// By how much an entry of `Rᵀ R` may differ from that of the unit matrix: entries of seven digits make a rotation.
+const ROTATION_SLACK: f64 = 1e-6;
+/// From where on that is said, and the quaternion is given length 1.
+const ROUNDED_ROTATION: f64 = 1e-9;
 
 /// The product, part by part.
 pub(super) fn product(p: DQuat, q: DQuat, work: &mut Work) -> DQuat {
@@ -70,11 +77,18 @@ fn quat(call: &mut Call) -> Result<Value, Wrong> {
         _ => {
             let linear = call.transform(0)?.linear();
             let rest = (linear.transpose() * linear - lumbre::math::DMat3::IDENTITY).to_cols_array();
-            if linear.determinant() <= 0.0 || rest.iter().any(|entry| entry.abs() > 1e-9) {
-                return Err(call.wrong(0, call.work.texts.rotation_matrix));
+            let away = rest.iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+            let texts = call.work.texts;
+            if linear.determinant() <= 0.0 || away > ROTATION_SLACK {
+                return Err(call.wrong(0, texts.rotation_matrix));
             }
-            call.work.line(call.work.texts.largest_part);
-            quaternion::from_matrix(&linear)
+            call.work.line(texts.largest_part);
+            let q = quaternion::from_matrix(&linear);
+            if away > ROUNDED_ROTATION {
+                let away: f64 = format!("{away:.1e}").parse().unwrap_or(away);
+                call.work.line(filled(texts.nearly_rotation, &[&number(away)]));
+            }
+            quaternion::unit(q).filter(|_| away > ROUNDED_ROTATION).unwrap_or(q)
         }
     };
     let [w, x, y, z] = quaternion::to_wxyz(q).map(factor);

@@ -4,9 +4,9 @@
 //! statement = [NAME "="] sum | "help" [NAME]
 //! sum       = product {("+" | "-") product}
 //! product   = signed {("*" | "/") signed}
-//! signed    = {"+" | "-"} power
+//! signed    = {"+" | "-"} [NUMBER] power, the number without a space before a name or a bracket
 //! power     = primary ["^" signed]
-//! primary   = NUMBER | NAME | NAME "(" [sum {"," sum}] ")" | "(" sum ")" | "[" sum {"," sum} "]"
+//! primary   = NUMBER ["°"] | NAME | NAME "(" [sum {"," sum}] ")" | "(" sum ")" | "[" sum {"," sum} "]" | "|" sum "|"
 //! ```
 
 use std::collections::BTreeMap;
@@ -31,23 +31,7 @@ const DEEPEST: usize = 100;
 const MOST: usize = 16;
 
 /// The names that always have a value.
-const CONSTANTS: [&str; 7] = ["pi", "x", "y", "z", "i", "j", "k"];
-
-/// Names of other programs for a function.
-pub(super) const SYNONYMS: [(&str, &[&str]); 12] = [
-    ("unit", &["normalize", "normalise", "normalized", "normalised"]),
-    ("length", &["norm", "magnitude", "mag", "abs"]),
-    ("inverse", &["inv", "invert"]),
-    ("transpose", &["transposed"]),
-    ("det", &["determinant"]),
-    ("look_at", &["lookat"]),
-    ("ortho", &["orthographic"]),
-    ("project", &["projection", "proj"]),
-    ("rotate", &["rotation", "rot", "axis_angle"]),
-    ("translate", &["translation"]),
-    ("quat", &["quaternion"]),
-    ("camera_ray", &["ray"]),
-];
+const CONSTANTS: [&str; 8] = ["pi", "π", "x", "y", "z", "i", "j", "k"];
 
 /// What a statement gave.
 #[derive(Debug)]
@@ -94,6 +78,13 @@ impl Session {
     }
 }
 
+/// Whether a number may stand before what it multiplies, as in `2x`: after `/` and `^` that has two readings.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Coefficient {
+    Allowed,
+    Ambiguous,
+}
+
 struct Reader<'a> {
     session: &'a mut Session,
     lexer: Lexer<'a>,
@@ -108,7 +99,7 @@ impl<'a> Reader<'a> {
         let mut lexer = Lexer::new(text, session.texts);
         let token = lexer.next()?;
         // The second one is looked at only where it belongs to the first.
-        let next = Token { kind: TokenKind::Break, offset: token.offset };
+        let next = Token { kind: TokenKind::Break, offset: token.offset, is_adjacent: false };
         let work = Work::new(session.texts);
         let mut reader = Self { session, lexer, token, next, depth: 0, work };
         reader.look_ahead()?;
@@ -160,7 +151,7 @@ impl<'a> Reader<'a> {
             (TokenKind::Name(name), TokenKind::Symbol('=')) => {
                 let Token { offset, .. } = self.advance()?;
                 self.advance()?;
-                if functions::find(&name).is_some() || name == "ans" || name == "help" {
+                if functions::named(&name).is_some() || name == "ans" || name == "help" {
                     let what = Diagnostic::error(texts.name_is_taken).found(quoted(&name));
                     return Err(Wrong::new(offset, what.expected(texts.another_name)));
                 }
@@ -211,11 +202,13 @@ impl<'a> Reader<'a> {
     }
 
     fn product(&mut self) -> Result<Value, Wrong> {
-        let mut left = self.signed()?;
+        let mut left = self.signed(Coefficient::Allowed)?;
         while self.is_at('*') || self.is_at('/') {
             let sign = self.advance()?;
-            let right = self.signed()?;
-            let result = if sign.kind == TokenKind::Symbol('*') {
+            let is_product = sign.kind == TokenKind::Symbol('*');
+            let right =
+                self.signed(if is_product { Coefficient::Allowed } else { Coefficient::Ambiguous })?;
+            let result = if is_product {
                 operators::multiply(&left, &right, &mut self.work)
             } else {
                 operators::divide(&left, &right, &mut self.work)
@@ -225,12 +218,26 @@ impl<'a> Reader<'a> {
         Ok(left)
     }
 
-    fn signed(&mut self) -> Result<Value, Wrong> {
+    fn signed(&mut self, coefficient: Coefficient) -> Result<Value, Wrong> {
         let mut is_negative = false;
         while self.is_at('+') || self.is_at('-') {
             is_negative ^= self.advance()?.kind == TokenKind::Symbol('-');
         }
-        let value = self.power()?;
+        let begins_operand = matches!(self.next.kind, TokenKind::Name(_) | TokenKind::Symbol('(' | '['));
+        let value = match self.token.kind {
+            TokenKind::Number(factor) if begins_operand && self.next.is_adjacent => {
+                if coefficient == Coefficient::Ambiguous {
+                    let texts = self.session.texts;
+                    let what = Diagnostic::error(texts.two_readings).expected(texts.one_reading);
+                    return Err(Wrong::new(self.token.offset, what));
+                }
+                let Token { offset, .. } = self.advance()?;
+                let value = self.power()?;
+                let result = operators::multiply(&Value::Number(factor), &value, &mut self.work);
+                self.finite(result, offset)?
+            }
+            _ => self.power()?,
+        };
         Ok(if is_negative { operators::negated(&value) } else { value })
     }
 
@@ -244,7 +251,7 @@ impl<'a> Reader<'a> {
         let mut base = self.primary()?;
         if self.is_at('^') {
             let sign = self.advance()?;
-            let exponent = self.signed()?;
+            let exponent = self.signed(Coefficient::Ambiguous)?;
             let result = operators::power(&base, &exponent, &mut self.work);
             base = self.finite(result, sign.offset)?;
         }
@@ -257,6 +264,10 @@ impl<'a> Reader<'a> {
         match self.token.kind.clone() {
             TokenKind::Number(x) => {
                 self.advance()?;
+                // Angles are in degrees anyway.
+                if self.is_at('°') {
+                    self.advance()?;
+                }
                 Ok(Value::Number(x))
             }
             TokenKind::Name(name) => {
@@ -276,6 +287,13 @@ impl<'a> Reader<'a> {
                 let Token { offset, .. } = self.advance()?;
                 let items = self.list(']', texts.comma_or_bracket)?;
                 self.collected(items, offset)
+            }
+            TokenKind::Symbol('|') => {
+                let Token { offset, .. } = self.advance()?;
+                let inner = self.token.offset;
+                let argument = Argument { value: self.sum()?, offset: inner };
+                self.expect('|', texts.operator_or_bar)?;
+                self.evaluated("length", offset, &[argument])
             }
             _ => Err(self.unexpected(texts.operand)),
         }
@@ -339,12 +357,20 @@ impl<'a> Reader<'a> {
 
     fn call(&mut self, name: &str, offset: usize) -> Result<Value, Wrong> {
         let texts = self.session.texts;
-        let Some(function) = functions::find(name) else {
+        if functions::find(name).is_none() {
             return Err(self.unknown(offset, texts.unknown_function, name));
-        };
+        }
         self.advance()?;
         let arguments = self.list(')', texts.comma_or_parenthesis)?;
-        let result = Call::new(function, offset, &arguments, &mut self.work).run()?;
+        self.evaluated(name, offset, &arguments)
+    }
+
+    /// The value of a function that is called at this byte.
+    fn evaluated(&mut self, name: &str, offset: usize, arguments: &[Argument]) -> Result<Value, Wrong> {
+        let Some(function) = functions::find(name) else {
+            return Err(self.unknown(offset, self.session.texts.unknown_function, name));
+        };
+        let result = Call::new(function, offset, arguments, &mut self.work).run()?;
         self.finite(Ok(result), offset)
     }
 
@@ -356,7 +382,7 @@ impl<'a> Reader<'a> {
         let unit =
             |part: usize| quaternion::from_wxyz(std::array::from_fn(|i| f64::from(u8::from(i == part))));
         match name {
-            "pi" => Ok(Value::Number(std::f64::consts::PI)),
+            "pi" | "π" => Ok(Value::Number(std::f64::consts::PI)),
             "x" => Ok(DVec3::X.into()),
             "y" => Ok(DVec3::Y.into()),
             "z" => Ok(DVec3::Z.into()),
@@ -376,11 +402,7 @@ impl<'a> Reader<'a> {
         let own = self.session.names.keys().map(String::as_str);
         let texts = self.session.texts;
         let what = Diagnostic::error(message).found(quoted(name)).expected(texts.known_names);
-        let by_meaning = SYNONYMS.iter().find(|(_, words)| words.contains(&name));
-        match by_meaning {
-            Some((function, _)) => Wrong::new(offset, what.suggest(function, [*function])),
-            None => Wrong::new(offset, what.suggest(name, own.chain(functions).chain(CONSTANTS))),
-        }
+        Wrong::new(offset, what.suggest(name, own.chain(functions).chain(CONSTANTS)))
     }
 
     /// The result of an operation at this byte.

@@ -7,7 +7,7 @@ pub(super) static SPANISH: Texts = Texts {
     vector: "un vector",
     vector_of: "un vector de {0}",
     vector_2_or_3: "un vector de 2 o 3",
-    vector_or_quaternion: "un vector de 2 o 3, o un cuaternión",
+    measured: "un número, un vector o un cuaternión; det(M) es el determinante",
     matrix: "una matriz",
     matrix_of: "una matriz de {0}×{1}",
     square_matrix: "una matriz cuadrada de tamaño 1 a 4",
@@ -15,14 +15,17 @@ pub(super) static SPANISH: Texts = Texts {
     transform_or_quaternion: "una transformación o un cuaternión",
     quaternion: "un cuaternión",
     unknown_character: "esto no forma parte de una expresión",
-    characters: "un número, un nombre, un paréntesis, un corchete o uno de + - * / ^ = , ;",
+    characters: "un número, un nombre, un paréntesis, un corchete o uno de + - * / ^ = , ; | °",
     not_a_number: "esto no es un número",
-    number_form: "un número como 2, 0.5 o 1e-3, y * entre factores",
+    number_form: "un número como 2, 0.5 o 1e-3",
     unexpected: "aquí no se esperaba esto",
     end: "el final de la expresión",
-    operand: "un número, un nombre, \"(\" o \"[\"",
+    operand: "un número, un nombre, \"(\", \"[\" o \"|\"",
     operator_or_end: "uno de + - * / ^, o \";\" antes de otra expresión",
     operator_or_parenthesis: "uno de + - * / ^, o \")\"",
+    operator_or_bar: "uno de + - * / ^, o \"|\"",
+    two_readings: "tras / y ^ un producto sin * se puede leer de dos maneras",
+    one_reading: "paréntesis, como en 1/(2*x) o (1/2)*x",
     no_tuple: "\")\"; un vector se escribe [1, 2, 3]",
     comma_or_bracket: "\",\" o \"]\"",
     comma_or_parenthesis: "\",\" o \")\"",
@@ -69,7 +72,9 @@ pub(super) static SPANISH: Texts = Texts {
     opening: "un ángulo entre 0 y 180 grados",
     above_0: "más que 0",
     beyond_near: "más que near",
-    rotation_matrix: "una rotación: ortonormal, con determinante 1",
+    rotation_matrix: "una rotación: ortonormal hasta 1e-6, con determinante 1",
+    no_real_eigenvalue: "ningún valor propio es real, y el resultado es un vector de los reales",
+    real_eigenvalue: "una matriz con algún valor propio real, como una simétrica o una de 3 filas",
     acute: "> 0: el ángulo es menor que 90°",
     obtuse: "< 0: el ángulo es mayor que 90°",
     right_angle: "= 0: son perpendiculares, o uno es cero",
@@ -99,6 +104,7 @@ pub(super) static SPANISH: Texts = Texts {
     depth_range: "tras dividir entre w = -z: z = -near va a -1, z = -far va a 1",
     depth_is_lost: "singular: se pierde la profundidad",
     largest_part: "la parte mayor por una raíz cuadrada, las demás por división (Shepperd 1978)",
+    nearly_rotation: "una rotación con elementos redondeados: RᵀR difiere de I en {0}; se da al cuaternión longitud 1",
     heading: "rumbo",
     attitude: "actitud",
     bank: "inclinación",
@@ -107,6 +113,12 @@ pub(super) static SPANISH: Texts = Texts {
     by_cofactors: "M⁻¹ = Cᵀ / det M,  Cij = (-1)^(i+j) por el determinante sin la fila i ni la columna j",
     affine_inverse: "la transformación p' = L p + t se deshace con p = L⁻¹ p' - L⁻¹ t",
     nearly_singular: "casi singular: filas de estas longitudes admiten un determinante 1/{0} veces mayor; deciden los últimos dígitos de los elementos",
+    all_zero: "todos los elementos son 0",
+    some_minor: "las filas {0} y las columnas {1} son independientes, pues su determinante no es 0:",
+    no_minor: "todo determinante de {0} filas y {0} columnas es 0, exactamente",
+    characteristic: "M v = λ v con algún v distinto de 0: λ es una raíz del polinomio característico",
+    symmetric: "simétrica: todos los valores propios son reales",
+    only_real: "el resultado contiene los reales",
     no_solution: "M x = b no tiene solución: sus ecuaciones se contradicen",
     many_solutions: "M x = b tiene más de una solución: sus ecuaciones no son independientes",
     divided_by_square: "q = (a, b, c, d), dividido entre |q|²:",
@@ -136,12 +148,14 @@ pub(super) static SPANISH: Texts = Texts {
     not_utf8: "no es un texto en UTF-8",
     not_regular: "no es un archivo regular",
     too_long: "una expresión de {0} bytes o más (--file lee cualquier longitud)",
+    also: " (también llamada {0})",
     language: "\
-números        1  -0.5  1e-3  pi; los ángulos van en grados
+números        1  -0.5  1e-3  pi; los ángulos van en grados, y 30° es 30
 vectores       [1, 2, 3] de 1 a 4 números; x, y, z son los ejes
 matrices       [[1, 2], [3, 4]], fila por fila
 cuaterniones   quat(w, x, y, z), o 1 + 2*i + 3*j + 4*k
-operadores     + - * / ^; M * p, A * B (primero B), v * M (una fila), M^-1, M^3
+operadores     + - * / ^; 2x y 2(a + b) sin *; |v| es length(v)
+productos      M * p, A * B (primero B), v * M (una fila), M^-1, M^3
 nombres        a = ...; el último resultado es ans
 sentencias     en líneas propias, o separadas por ; un comentario empieza con #
 help NOMBRE    una función
@@ -151,7 +165,7 @@ help NOMBRE    una función
         ("cross", "el producto vectorial"),
         ("cross_matrix", "la matriz [a]× cuyo producto por b es a×b"),
         ("mixed", "el producto mixto a·(b×c), un volumen y un determinante"),
-        ("length", "la longitud de un vector o de un cuaternión"),
+        ("length", "la longitud de un vector o de un cuaternión, el valor absoluto de un número"),
         ("unit", "la misma dirección con longitud 1; también de un cuaternión"),
         ("angle", "el ángulo en grados, preciso también cuando es pequeño"),
         ("project", "la parte de b paralela a a"),
@@ -179,6 +193,11 @@ help NOMBRE    una función
         ("inverse", "la inversa de una matriz, de una transformación o de un cuaternión"),
         ("transpose", "la traspuesta"),
         ("det", "el determinante"),
+        ("rank", "cuántas filas, y cuántas columnas, son independientes"),
+        (
+            "eigenvalues",
+            "los λ reales con M v = λ v para algún v, en orden ascendente; los pasos muestran los complejos",
+        ),
         ("solve", "el x con M x = b, por la regla de Cramer, con 1 a 4 incógnitas"),
         ("matrix", "la matriz de 4×4 de una transformación, o la de 3×3 de un cuaternión"),
         ("linear", "el bloque de 3×3 de una transformación"),

@@ -7,7 +7,7 @@ use super::functions;
 use super::session::{Outcome, Session};
 use super::spanish::SPANISH;
 use super::value::Value;
-use super::{Form, message, session, shown};
+use super::{Form, message, shown};
 
 /// The value of the last statement.
 fn value(text: &str) -> Result<Value, String> {
@@ -32,7 +32,7 @@ fn random_tokens_are_evaluated_or_refused_and_never_panic() {
     let mut words: Vec<String> = functions::all().map(|function| format!("{}(", function.name)).collect();
     let others = "0 1 -1 2 1e308 -1e-308 5e-324 90 0.5 pi x y z i j k a ans = ( ) [ ] , ; + - * / ^ ^-1 \
         [1,2] [1,2,3] [0,0,0] [1,2,3,4] [[1,2],[3,4]] [[1,0,0],[0,1,0],[0,0,1]] [[0,0,0],[0,0,0],[0,0,0]] [1e200,0,-1e200] \
-        rotate_x(30) translate([1,2,3]) perspective(60,1,1,9) quat(1,2,3,4) quat(0,0,0,0) help € \u{0} \" . .. 1e 2x # ";
+        rotate_x(30) translate([1,2,3]) perspective(60,1,1,9) quat(1,2,3,4) quat(0,0,0,0) help € \u{0} \" . .. 1e 2x | ° 2( ñ # ";
     words.extend(others.split(' ').map(str::to_owned));
     words.push("\n".into());
     let simple: Vec<&String> = words.iter().filter(|word| value(word).is_ok()).collect();
@@ -151,13 +151,22 @@ fn mistakes_say_where_what_and_what_would_do() {
             "x + 2",
             "expression:1:3: + is not defined for these (found a vector of 3 + a number; expected two numbers, vectors, matrices or quaternions of the same size)\n  x + 2\n    ^",
         ),
+        ("norm", "expression:1:1: this is a function (found \"norm\"; expected norm(a))\n  norm\n  ^"),
         (
-            "normalize(z)",
-            "expression:1:1: unknown function (found \"normalize\"; expected a name that `help` lists; did you mean \"unit\"?)\n  normalize(z)\n  ^",
+            "1/2x",
+            "expression:1:3: after / and ^ a product without * can be read in two ways (expected parentheses, as in 1/(2*x) or (1/2)*x)\n  1/2x\n    ^",
         ),
         (
-            "1 + norm(z)",
-            "expression:1:5: unknown function (found \"norm\"; expected a name that `help` lists; did you mean \"length\"?)\n  1 + norm(z)\n      ^",
+            "3 + |[1, 2]",
+            "expression:1:12: unexpected here (found the end; expected one of + - * / ^, or \"|\")\n  3 + |[1, 2]\n             ^",
+        ),
+        (
+            "|rotate(90)|",
+            "expression:1:2: wrong argument 1 of length (found a 2×2 matrix; expected a number, a vector or a quaternion; det(M) is the determinant)\n  |rotate(90)|\n   ^",
+        ),
+        (
+            "eigenvalues(rotate(90))",
+            "expression:1:1: no eigenvalue is real, and the result is a vector of real ones (found 0 ± 1 i; expected a matrix with a real eigenvalue, such as a symmetric one or one of 3 rows)\n  eigenvalues(rotate(90))\n  ^",
         ),
         (
             "1 / 0",
@@ -200,8 +209,8 @@ fn mistakes_say_where_what_and_what_would_do() {
             "expression:1:1: this name is already used (found \"dot\"; expected another name)\n  dot = 3\n  ^",
         ),
         (
-            "2x",
-            "expression:1:1: this is not a number (found \"2x\"; expected a number such as 2, 0.5 or 1e-3, and * between factors)\n  2x\n  ^",
+            "1.2.3",
+            "expression:1:1: this is not a number (found \"1.2.3\"; expected a number such as 2, 0.5 or 1e-3)\n  1.2.3\n  ^",
         ),
     ] {
         assert_eq!(value(text).expect_err(text), expected);
@@ -209,10 +218,99 @@ fn mistakes_say_where_what_and_what_would_do() {
 }
 
 #[test]
+fn what_is_written_on_paper_is_taken() {
+    for (text, expected) in [
+        ("norm([3, 4, 12])", "13"),
+        ("|[3, 4, 12]|", "13"),
+        ("|-7| * |[3, 4]|", "35"),
+        ("1 + |[2, 4, 5, 6]|", "10"),
+        ("normalize([0, 3, 4])", "[0, 0.6, 0.8]"),
+        ("sin(30°) + sin(30º)", "1"),
+        ("2pi - 2*pi", "0"),
+        ("2π / 2", "3.141592653589793"),
+        ("2x + 3y", "[2, 3, 0]"),
+        ("a = 3; 2a^2", "18"),
+        ("-2(3 + 4)", "-14"),
+        ("2[1, 2]", "[2, 4]"),
+        ("2sin(30)", "1"),
+        ("3e2x", "[300, 0, 0]"),
+        ("e = 5; 2e + 1e1", "20"),
+        ("1 + 2i + 3j", "quat(1, 2, 3, 0)"),
+        ("ángulo = 30; ñandú_2 = 2ángulo; ñandú_2", "60"),
+        ("norm = 4; norm + norm([3, 4])", "9"),
+        ("rank([[1, 2], [2, 4]])", "1"),
+        ("rank([[1, 2, 3], [4, 5, 6]])", "2"),
+        ("rank(cross_matrix([0.1, 0.2, 0.3]))", "2"),
+        ("rank([[0, 0], [0, 0]])", "0"),
+        ("rank(translate([1, 2, 3]))", "4"),
+        ("eigenvalues([[2, 1], [1, 2]])", "[1, 3]"),
+        ("eigenvalues([[2, 1, 1], [1, 2, 1], [1, 1, 2]])", "[1, 1, 4]"),
+        ("eigenvalues(linear(rotate_z(90)))", "[1]"),
+        ("eigenvalues(translate([1, 2, 3]))", "[1, 1, 1, 1]"),
+    ] {
+        assert_eq!(line(text), expected, "{text}");
+    }
+    // A space before a factor may be a comma that is missing.
+    for text in ["2 x", "[1 y]", "2 (3)", "x 2", "2deg", "2|x|"] {
+        assert!(value(text).is_err(), "{text}");
+    }
+    // Seven digits make a rotation, four do not.
+    let seven = "quat([[0.7071068, -0.7071068, 0], [0.7071068, 0.7071068, 0], [0, 0, 1]])";
+    let Ok(Value::Quaternion(q)) = value(seven) else { panic!("{:?}", value(seven)) };
+    let half_turn = std::f64::consts::FRAC_PI_8;
+    assert!((q.w - half_turn.cos()).abs() < 1e-7 && (q.z - half_turn.sin()).abs() < 1e-7);
+    assert!((q.length() - 1.0).abs() < 1e-15);
+    assert!(value(&seven.replace("0.7071068", "0.7071")).is_err());
+}
+
+#[test]
+fn steps_of_eigenvalues_and_ranks_prove_them() {
+    let steps = |text: &str| {
+        let mut lines = vec![];
+        let run = Session::new(&ENGLISH).run(text, |outcome| {
+            if let Outcome::Value { steps, .. } = outcome {
+                lines.extend(steps.into_iter().flat_map(|step| step.lines));
+            }
+            Ok::<(), ()>(())
+        });
+        run.unwrap_or_else(|wrong| panic!("{text}: {wrong:?}")).expect("nothing stops it");
+        lines.join("\n")
+    };
+    let pair = steps("eigenvalues([[0, -1, 0], [1, 0, 0], [0, 0, -2]])");
+    for line in [
+        "det(λ I - M) = λ³ + 2 λ² + λ + 2 = 0",
+        "λ1 = -2",
+        "λ2, λ3 = 0 ± 1 i",
+        "the result has the real ones",
+    ] {
+        assert!(pair.contains(line), "{line}: {pair}");
+    }
+    let two = steps("eigenvalues([[2, 1], [1, 2]])");
+    for line in ["λ² - 4 λ + 3 = 0", "symmetric", "= (2 + 2)/2 ± √(((2 - 2)/2)² + 1·1)", "λ2 = 3"] {
+        assert!(two.contains(line), "{line}: {two}");
+    }
+    let rank = steps("rank([[1, 2, 3], [2, 4, 7], [3, 6, 10]])");
+    for line in [
+        "rows 1, 2 and columns 1, 3 are independent",
+        "| 1  3 |",
+        "every determinant of 3 rows and 3 columns is 0",
+    ] {
+        assert!(rank.contains(line), "{line}: {rank}");
+    }
+    let rounded = steps("rank([[0.1, 0.2], [0.3, 0.6]])");
+    assert!(rounded.contains("nearly singular"), "{rounded}");
+    let seven = steps("quat([[0.7071068, -0.7071068, 0], [0.7071068, 0.7071068, 0], [0, 0, 1]])");
+    assert!(seven.contains("a rotation with rounded entries: RᵀR differs from I by "), "{seven}");
+}
+
+#[test]
 fn every_synonym_names_a_function_and_is_none_itself() {
-    for (function, words) in session::SYNONYMS {
-        assert!(functions::find(function).is_some(), "{function}");
-        assert!(words.iter().all(|word| functions::find(word).is_none()), "{words:?}");
+    for (function, words) in functions::SYNONYMS {
+        assert!(functions::named(function).is_some(), "{function}");
+        for word in words {
+            assert!(functions::named(word).is_none(), "{word}");
+            assert_eq!(functions::find(word).map(|found| found.name), Some(function));
+        }
     }
 }
 

@@ -87,9 +87,17 @@ fn mixed(call: &mut Call) -> Result<Value, Wrong> {
 
 fn length(call: &mut Call) -> Result<Value, Wrong> {
     let (squares, result) = match call.value(0) {
+        Value::Number(x) => {
+            let result = x.abs();
+            call.work.line(format!("|{}| = {}", number(*x), number(result)));
+            return Ok(Value::Number(result));
+        }
         Value::Quaternion(q) => (quaternion::to_wxyz(*q).to_vec(), quaternion::length(*q)),
-        Value::Vector(v) if v.len() < 4 => (v.clone(), vector::length(call.flat_or_space(0)?.0)),
-        _ => return Err(call.wrong(0, call.work.texts.vector_or_quaternion)),
+        Value::Vector(v) => {
+            let at = |i: usize| v.get(i).copied().unwrap_or(0.0);
+            (v.clone(), quaternion::length(quaternion::from_wxyz([at(0), at(1), at(2), at(3)])))
+        }
+        _ => return Err(call.wrong(0, call.work.texts.measured)),
     };
     let sum: Vec<String> = squares.iter().map(|x| format!("{}²", factor(*x))).collect();
     call.work.line(format!("|a| = √({}) = {}", sum.join(" + "), number(result)));

@@ -1,6 +1,7 @@
 //! The pictures of `lumbre render`: one, the frames of an animation, or views from all around.
 
 use std::ops::RangeInclusive;
+use std::path::Path;
 use std::time::Instant;
 
 use lumbre::{CancelToken, RenderOptions};
@@ -13,8 +14,6 @@ use crate::output::{self, Inputs};
 use crate::progress::Series;
 use crate::reading::Frames;
 use crate::signals::{Phase, Signals};
-
-const READING: Phase = Phase::Preparing("reading the scene");
 
 /// Runs the command.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -41,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let cancel = CancelToken::new();
     let signals = Signals::listen(&cancel)?;
     signals.end_at(arguments.deadline(start));
-    signals.enter(READING);
+    signals.enter(reading(arguments));
     let mut stage = arguments.staging.stage(arguments.size, arguments.reading.limits())?;
     arguments.view.set(&mut stage)?;
     // The first picture's name and exposure are used for all.
@@ -65,6 +64,13 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
 }
 
+/// The phase of reading a scene: a file has an end, a pipe may have none.
+fn reading(arguments: &Arguments) -> Phase {
+    let what = "reading the scene";
+    let is_file = arguments.inputs().all(Path::is_file);
+    if is_file { Phase::Preparing(what) } else { Phase::Receiving(what) }
+}
+
 /// Renders frames of an animation, each read at its own time.
 fn frames(context: Context<'_>, numbers: &RangeInclusive<u32>, first: &mut First) -> Result<(), Failure> {
     let Context { arguments, signals, .. } = context;
@@ -73,7 +79,7 @@ fn frames(context: Context<'_>, numbers: &RangeInclusive<u32>, first: &mut First
     for number in numbers.clone() {
         let start = Instant::now();
         signals.end_at(arguments.deadline(start));
-        signals.enter(READING);
+        signals.enter(reading(arguments));
         let (desc, mut diagnostics) = arguments.reading.describe_frame(&arguments.scene, number)?;
         let done = number - numbers.start();
         let series = Series { number, done, count, start: context.start };

@@ -4,6 +4,10 @@
 /// `{}` stands for what comes from the file, in the same order in both; `{=}` for what stays as it is.
 pub(super) const FILES: &[(&str, &str)] = &[
     ("it names no file", "no nombra ningún archivo"),
+    (
+        "a file that can be opened; --lenient takes grey for images that cannot",
+        "un archivo que se pueda abrir; --lenient pone gris en lugar de las imágenes que no se pueden",
+    ),
     ("it is the name of a device", "es el nombre de un dispositivo"),
     ("it is a folder", "es una carpeta"),
     ("it is read-only", "es de solo lectura"),

@@ -181,6 +181,11 @@ pub(super) const SCENES: &[(&str, &str)] = &[
         "nudos no decrecientes, con una superficie entre ellos",
     ),
     ("{} of an openpbr material is left out", "se omite {} de un material openpbr"),
+    ("{} of an openpbr material with a body is left out", "se omite {} de un material openpbr con un cuerpo"),
+    (
+        "\"subsurface_weight\" of an openpbr material is left out: a surface lets all light that it does not reflect into the body (1), or none (0)",
+        "se omite \"subsurface_weight\" de un material openpbr: una superficie deja entrar en el cuerpo toda la luz que no refleja (1), o ninguna (0)",
+    ),
     (
         "\"transmission_color\" without \"transmission_depth\" is left out: a body has its colour at a depth",
         "se omite \"transmission_color\" sin \"transmission_depth\": un cuerpo tiene su color a una profundidad",

@@ -67,7 +67,7 @@ const ALL: [(&str, &str, &str, &[&str]); 12] = [
 ];
 
 /// Why parameters that are read without a word have no effect.
-const REASONS: [(&str, &str); 37] = [
+const REASONS: [(&str, &str); 35] = [
     ("lightsampler", "lights are chosen by a tree: it changes the noise alone"),
     ("samplelights", "lights are always sampled: it changes the noise alone"),
     ("samplebsdf", "surfaces are always sampled: it changes the noise alone"),
@@ -98,13 +98,11 @@ const REASONS: [(&str, &str); 37] = [
     ("wavefront", "there is one way to render, by the processor"),
     ("rendercoordsys", "points have double precision in any space"),
     ("mfp", "the default of another parameter stands in its place"),
-    ("subsurface_color", "light does not scatter inside this material: see subsurface_weight"),
-    ("subsurface_radius", "light does not scatter inside this material: see subsurface_weight"),
-    ("subsurface_radius_scale", "light does not scatter inside this material: see subsurface_weight"),
-    ("subsurface_scatter_anisotropy", "light does not scatter inside this material: see subsurface_weight"),
+    ("subsurface_color", "of use with a subsurface_weight of 1 alone"),
+    ("subsurface_radius", "of use with a subsurface_weight of 1 alone"),
+    ("subsurface_radius_scale", "of use with a subsurface_weight of 1 alone"),
+    ("subsurface_scatter_anisotropy", "of use with a subsurface_weight of 1 alone"),
     ("emission_color", "an AreaLightSource shines: see emission_luminance"),
-    ("coat_ior", "it is rendered by the layers of principled, whose coat has an index of its own"),
-    ("coat_darkening", "it is rendered by the layers of principled, whose coat has no such number"),
     ("temperaturecutoff", "of use with a grid of temperatures alone"),
     ("temperatureoffset", "of use with a grid of temperatures alone"),
     ("temperaturescale", "of use with a grid of temperatures alone"),

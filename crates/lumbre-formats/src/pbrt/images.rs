@@ -7,10 +7,13 @@ use lumbre_image::Encoding;
 use lumbre_shading::{ImageFilter, MipMap, MipMapOptions, Wrap};
 
 use super::convert::{Converter, file_fault};
-use super::source::{Result, SourcePosition};
+use super::source::{Fault, Result, SourcePosition};
 use super::textures::unreadable;
 use crate::image::{ImageFile, open_scene_image};
 use crate::{Diagnostic, FormatError};
+
+/// A scene says exactly what to render, so an image that is missing is an error; of a model it is a warning.
+const LENIENT: &str = "a file that can be opened; --lenient takes grey for images that cannot";
 
 /// The key of an image with its lookup: its path, and how it is decoded and filtered.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -71,6 +74,10 @@ impl Converter<'_, '_> {
                 self.missing.insert(path);
                 Ok(ImageFile::grey())
             }
+            Err(error @ FormatError::Io { .. }) => Err(match file_fault(at, error) {
+                Fault::Input(at, wrong) => at.wrong(wrong.expected(LENIENT)),
+                fault => fault,
+            }),
             Err(error) => Err(file_fault(at, error)),
         }
     }

@@ -13,7 +13,7 @@ use lumbre_shading::{Spectrum, SpectrumValue};
 
 use super::colour;
 use super::convert::{Converter, MediumSlot, file_fault};
-use super::params::{Param, Params, Type};
+use super::params::{AT_MOST_F32, Param, Params, Type};
 use super::source::{AtSpot, Result, SourcePosition};
 use super::textures::{LightSpectrum, SpectrumUse};
 use crate::diagnostic::{number, quoted};
@@ -454,7 +454,8 @@ fn counted(param: &Param, size: [usize; 3], each: usize) -> Result<&[f64]> {
     if let Some(i) = numbers.iter().position(|v| !(0.0..=most).contains(v)) {
         let wrong = Diagnostic::error(format!("wrong value for parameter {}", quoted(&param.name)));
         let wrong = wrong.found(format!("{} at position {i}", number(numbers[i])));
-        return Err(param.spot.wrong(wrong.expected("numbers that are not negative")));
+        let expected = if numbers[i] < 0.0 { "numbers that are not negative" } else { AT_MOST_F32 };
+        return Err(param.spot.wrong(wrong.expected(expected)));
     }
     Ok(numbers)
 }

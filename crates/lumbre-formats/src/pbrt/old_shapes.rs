@@ -121,10 +121,10 @@ impl Converter<'_, '_> {
                 triangles.extend([[a, b, c], [a, c, d]]);
             }
         }
-        let positions: Vec<_> = points.iter().map(|&(point, _)| relative(point, origin)).collect();
-        if positions.iter().any(|point| !point.is_finite()) {
+        if points.iter().any(|(point, _)| !(*point - origin).as_vec3().is_finite()) {
             return Err(given.refuse("numbers of single precision"));
         }
+        let positions: Vec<_> = points.iter().map(|&(point, _)| relative(point, origin)).collect();
         let uvs: Vec<Vec2> = points.iter().map(|point| point.1.as_vec2()).collect();
         let normals = normals.map(|list| list.iter().map(|normal| normal.as_vec3()).collect());
         let mesh = MeshDesc { positions, triangles, normals, uvs: Some(uvs), ..MeshDesc::default() };

@@ -10,6 +10,9 @@ use super::source::{Result, SourcePosition};
 use crate::Diagnostic;
 use crate::diagnostic::{number, quoted};
 
+/// What is expected in place of a number that single precision does not hold.
+pub(super) const AT_MOST_F32: &str = "at most 3.4e38";
+
 /// The types of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Type {
@@ -342,7 +345,8 @@ impl Params {
         if above < value && value <= f64::from(f32::MAX) {
             return Ok(value);
         }
-        self.out_of_range(name, value, &format!("more than {above}"))
+        let expected = if value > above { AT_MOST_F32 } else { &format!("more than {above}") };
+        self.out_of_range(name, value, expected)
     }
 
     /// A number that is not negative.
@@ -351,7 +355,7 @@ impl Params {
         if 0.0 <= value && value <= f64::from(f32::MAX) {
             return Ok(value);
         }
-        self.out_of_range(name, value, "0 or more")
+        self.out_of_range(name, value, if value > 0.0 { AT_MOST_F32 } else { "0 or more" })
     }
 
     /// An error about the value of a parameter.

@@ -16,7 +16,7 @@ use lumbre_shading::{
 use super::colour;
 use super::convert::{Converter, FloatArc, Known, MAX_TEXTURE_LEAVES, SpectrumArc, file_fault};
 use super::lexer::{Lexer, TokenKind, parse_number};
-use super::params::{Param, Params, Type, Values};
+use super::params::{AT_MOST_F32, Param, Params, Type, Values};
 use super::source::{AtSpot, Fault, Result, SourcePosition};
 use crate::diagnostic::quoted;
 use crate::{Diagnostic, FormatError, Input};
@@ -150,7 +150,9 @@ impl Converter<'_, '_> {
                 let rgb = param.exactly::<3>()?;
                 let representable = |v: &f64| (0.0..=f64::from(f32::MAX)).contains(v);
                 if !rgb.iter().all(representable) {
-                    return Err(param.refuse_numbers("3 numbers that are not negative"));
+                    let is_negative = rgb.iter().any(|v| *v < 0.0);
+                    let expected = if is_negative { "3 numbers that are not negative" } else { AT_MOST_F32 };
+                    return Err(param.refuse_numbers(expected));
                 }
                 let colour = match usage {
                     SpectrumUse::Light => colour::light(&param.space, rgb),
@@ -698,8 +700,11 @@ fn pairs(numbers: &[f64]) -> std::result::Result<Vec<(f64, f64)>, &'static str> 
     if pairs.windows(2).any(|w| w[0].0 >= w[1].0) {
         return Err("wavelengths that ascend");
     }
-    if pairs.iter().any(|(_, v)| !(0.0..=f64::from(f32::MAX)).contains(v)) {
+    if pairs.iter().any(|(_, v)| *v < 0.0) {
         return Err("values that are not negative");
+    }
+    if pairs.iter().any(|(_, v)| *v > f64::from(f32::MAX)) {
+        return Err(AT_MOST_F32);
     }
     // As in pbrt-v4, a list is 0 outside its wavelengths.
     let mut pairs = pairs;
