@@ -297,7 +297,7 @@ fn steps_of_eigenvalues_and_ranks_prove_them() {
     ] {
         assert!(rank.contains(line), "{line}: {rank}");
     }
-    let rounded = steps("rank([[0.1, 0.2], [0.3, 0.6]])");
+    let rounded = steps("rank([[0.1, 0.3], [0.3, 0.9]])");
     assert!(rounded.contains("nearly singular"), "{rounded}");
     let seven = steps("quat([[0.7071068, -0.7071068, 0], [0.7071068, 0.7071068, 0], [0, 0, 1]])");
     assert!(seven.contains("a rotation with rounded entries: RᵀR differs from I by "), "{seven}");
