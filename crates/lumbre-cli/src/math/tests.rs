@@ -291,7 +291,7 @@ fn steps_of_eigenvalues_and_ranks_prove_them() {
     }
     let rank = steps("rank([[1, 2, 3], [2, 4, 7], [3, 6, 10]])");
     for line in [
-        "rows 1, 2 and columns 1, 3 are independent",
+        "rows: 1, 2; columns: 1, 3; their determinant is not 0",
         "| 1  3 |",
         "every determinant of 3 rows and 3 columns is 0",
     ] {
