@@ -114,7 +114,7 @@ pub(super) static ENGLISH: Texts = Texts {
     affine_inverse: "the map p' = L p + t goes back by p = L⁻¹ p' - L⁻¹ t",
     nearly_singular: "nearly singular: rows of these lengths allow a determinant 1/{0} times as large; the last digits of the entries decide",
     all_zero: "all entries are 0",
-    some_minor: "rows {0} and columns {1} are independent, for their determinant is not 0:",
+    some_minor: "rows: {0}; columns: {1}; their determinant is not 0, so that they are independent:",
     no_minor: "every determinant of {0} rows and {0} columns is 0, exactly",
     characteristic: "M v = λ v for some v that is not 0: λ is a root of the characteristic polynomial",
     symmetric: "symmetric: all eigenvalues are real",

@@ -114,7 +114,7 @@ pub(super) static SPANISH: Texts = Texts {
     affine_inverse: "la transformación p' = L p + t se deshace con p = L⁻¹ p' - L⁻¹ t",
     nearly_singular: "casi singular: filas de estas longitudes admiten un determinante 1/{0} veces mayor; deciden los últimos dígitos de los elementos",
     all_zero: "todos los elementos son 0",
-    some_minor: "las filas {0} y las columnas {1} son independientes, pues su determinante no es 0:",
+    some_minor: "filas: {0}; columnas: {1}; su determinante no es 0, luego son independientes:",
     no_minor: "todo determinante de {0} filas y {0} columnas es 0, exactamente",
     characteristic: "M v = λ v con algún v distinto de 0: λ es una raíz del polinomio característico",
     symmetric: "simétrica: todos los valores propios son reales",

@@ -291,13 +291,13 @@ fn steps_of_eigenvalues_and_ranks_prove_them() {
     }
     let rank = steps("rank([[1, 2, 3], [2, 4, 7], [3, 6, 10]])");
     for line in [
-        "rows 1, 2 and columns 1, 3 are independent",
+        "rows: 1, 2; columns: 1, 3; their determinant is not 0",
         "| 1  3 |",
         "every determinant of 3 rows and 3 columns is 0",
     ] {
         assert!(rank.contains(line), "{line}: {rank}");
     }
-    let rounded = steps("rank([[0.1, 0.2], [0.3, 0.6]])");
+    let rounded = steps("rank([[0.1, 0.3], [0.3, 0.9]])");
     assert!(rounded.contains("nearly singular"), "{rounded}");
     let seven = steps("quat([[0.7071068, -0.7071068, 0], [0.7071068, 0.7071068, 0], [0, 0, 1]])");
     assert!(seven.contains("a rotation with rounded entries: RᵀR differs from I by "), "{seven}");

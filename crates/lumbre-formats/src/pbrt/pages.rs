@@ -78,6 +78,8 @@ pub(super) fn special(page: &str, name: &str) -> Option<&'static str> {
         (_, "indices") => "0 1 2",
         (_, "faceIndices") => "5",
         ("uniformgrid" | "heterogeneous", "density" | "temperature" | "Lescale") => "0.5",
+        // Shares of a body are left out.
+        ("openpbr", "subsurface_weight") => "1",
         ("measured", "filename") => r#""images/satin.bsdf""#,
         ("realistic", "lensfile") => r#""images/triplet.txt""#,
         ("realistic", "aperture") => r#""star""#,

@@ -125,12 +125,16 @@ fn simple_roots(mut p: Polynomial) -> Eigenvalues {
         found.real.push(0.0);
         p.remove(0);
     }
+    let mut others = Eigenvalues::default();
     match &p[..] {
-        [c, b] => found.real.push(-c.over(b)),
-        [c, b, a] => quadratic_roots([a, b, c], &mut found),
-        [_, _, _, _, ..] => higher_roots(&p, &mut found),
+        [c, b] => others.real.push(-c.over(b)),
+        [c, b, a] => quadratic_roots([a, b, c], &mut others),
+        [_, _, _, _, ..] => higher_roots(&p, &mut others),
         _ => {}
     }
+    // A last step with exact values, where the quotients above are off by a unit in the last place.
+    found.real.extend(others.real.iter().map(|&x| minus([x, 0.0], newton_step(&p, [x, 0.0]))[0]));
+    found.pairs.extend(others.pairs.iter().map(|&pair| minus(pair, newton_step(&p, pair))));
     found
 }
 
@@ -185,8 +189,7 @@ fn higher_roots(p: &Polynomial, found: &mut Eigenvalues) {
         let own = size(minus(root, mirrored));
         let is_one_of_two = (0..degree).any(|j| j != k && size(minus(roots[j], mirrored)) < own);
         if !is_one_of_two {
-            let x = root[0];
-            found.real.push(x - newton_step(p, [x, 0.0])[0]);
+            found.real.push(root[0]);
         } else if root[1] > 0.0 {
             found.pairs.push(root);
         }
