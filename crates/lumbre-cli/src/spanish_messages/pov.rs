@@ -24,6 +24,11 @@ pub(super) const POV: &[(&str, &str)] = &[
     ("what a camera has", "lo que tiene una cámara"),
     ("the camera omnimax is rendered in perspective", "la cámara omnimax se representa en perspectiva"),
     ("the camera {} is rendered in perspective", "la cámara {=} se representa en perspectiva"),
+    ("a mesh_camera without meshes", "un mesh_camera sin mallas"),
+    (
+        "the greatest distance of a mesh_camera has no effect",
+        "la distancia máxima de un mesh_camera no tiene efecto",
+    ),
     ("the normal of a camera is not rendered", "la normal de una cámara no se representa"),
     ("a camera is needed, not {}", "se necesita una cámara, no {}"),
     ("{} has no meaning for a camera", "{=} no significa nada en una cámara"),

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use lumbre_image::Encoding;
 use lumbre_shading::Spectrum;
 use lumbre_shading::pov::{Colour, ImageMap, ImageProjection, ImageSource};
 
@@ -11,10 +12,29 @@ use super::{Parser, Result};
 use crate::diagnostic::quoted;
 use crate::{Diagnostic, Input};
 
+/// What an image is for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Use {
+    /// Light, in the working space.
+    Colours,
+    /// Heights: the numbers of the file.
+    Heights,
+}
+
 impl Parser<'_, '_> {
     /// An image with what modifies it, up to its closing brace.
     pub(super) fn image_body(&mut self) -> Result<ImageMap> {
-        let (mut image, indices) = self.image_source()?;
+        Ok(self.image_for(Use::Colours)?.0)
+    }
+
+    /// An image of heights with what modifies it, up to its closing brace, and its `bump_size`.
+    pub(super) fn bump_map_body(&mut self) -> Result<(ImageMap, Option<f64>)> {
+        self.image_for(Use::Heights)
+    }
+
+    fn image_for(&mut self, purpose: Use) -> Result<(ImageMap, Option<f64>)> {
+        let (mut image, indices) = self.image_source(purpose)?;
+        let (mut bump_size, mut by_index) = (None, false);
         // The filter or the transparency of single colours of its palette.
         let mut of_colours: Vec<(bool, f64, f32)> = Vec::new();
         while !self.take(b'}')? {
@@ -55,18 +75,25 @@ impl Parser<'_, '_> {
                     }
                     self.warn("the gamma of an image is that of its file");
                 }
+                "bump_size" if purpose == Use::Heights => bump_size = Some(self.finite()?),
+                "use_index" if purpose == Use::Heights => by_index = true,
                 "premultiplied" | "use_alpha" | "use_color" | "use_colour" | "use_index" => {
                     self.optional_bool()?;
                 }
                 _ => return Err(self.error(format!("{word} has no meaning for an image"))),
             }
         }
+        if by_index && let Some(indices) = &indices {
+            let mut heights = self.budget.vec(indices.len() as u64, "pixels")?;
+            heights.extend(indices.iter().map(|index| Colour::opaque(Spectrum::splat(f32::from(*index)))));
+            image.source = ImageSource::Pixels(heights.into());
+        }
         if !of_colours.is_empty()
             && let ImageSource::Pixels(pixels) = &image.source
         {
             let Some(indices) = indices else {
                 self.warn("an image without a palette has no single colours that could be transparent");
-                return Ok(image);
+                return Ok((image, bump_size));
             };
             let mut changed = self.budget.vec(pixels.len() as u64, "pixels")?;
             for (pixel, own) in pixels.iter().zip(&indices) {
@@ -80,11 +107,11 @@ impl Parser<'_, '_> {
             }
             image.source = ImageSource::Pixels(changed.into());
         }
-        Ok(image)
+        Ok((image, bump_size))
     }
 
     /// An image with the indices of its pixels, if it has a palette.
-    fn image_source(&mut self) -> Result<(ImageMap, Option<Vec<u8>>)> {
+    fn image_source(&mut self, purpose: Use) -> Result<(ImageMap, Option<Vec<u8>>)> {
         let mut image = ImageMap {
             source: ImageSource::Pixels(Arc::from([Colour::default()])),
             width: 1,
@@ -136,13 +163,22 @@ impl Parser<'_, '_> {
             let mut pixels = self.budget.vec(indexed.indices.len() as u64, "pixels")?;
             pixels.extend((0..indexed.indices.len()).map(|i| {
                 let [r, g, b] = indexed.colour(i).map(|c| f64::from(c) / 255.0);
-                let [r, g, b, ..] = self.settings.from_srgb([r, g, b, 0.0, 0.0]);
+                let [r, g, b, ..] = match purpose {
+                    Use::Colours => self.settings.from_srgb([r, g, b, 0.0, 0.0]),
+                    Use::Heights => [r, g, b, 0.0, 0.0],
+                };
                 Colour::opaque(Spectrum::new(r as f32, g as f32, b as f32))
             }));
             image.source = ImageSource::Pixels(pixels.into());
             return Ok((image, Some(indexed.indices.clone())));
         }
         let read = crate::image::read_image(&input, input.name(), self.budget, self.diagnostics);
+        let read = read.map(|mut file| {
+            if purpose == Use::Heights {
+                file.bitmap = file.bitmap.with_encoding(Encoding::Linear);
+            }
+            file
+        });
         match read.and_then(|file| file.to_image(self.budget)) {
             Ok(read) => {
                 (image.width, image.height) = (read.width(), read.height());
@@ -151,8 +187,14 @@ impl Parser<'_, '_> {
                 for y in 0..image.height {
                     for x in 0..image.width {
                         let rgb = read.pixel(x, y);
-                        let c = self.settings.from_linear(Spectrum::new(rgb.r, rgb.g, rgb.b));
+                        let c = Spectrum::new(rgb.r, rgb.g, rgb.b);
                         let alpha = read.alpha().map_or(1.0, |alpha| alpha[(y * image.width + x) as usize]);
+                        if purpose == Use::Heights {
+                            // In front of black.
+                            pixels.push(Colour::opaque(c * alpha));
+                            continue;
+                        }
+                        let c = self.settings.from_linear(c);
                         pixels.push(Colour { transmit: 1.0 - alpha, ..Colour::opaque(c) });
                     }
                 }
