@@ -379,3 +379,120 @@ fn bump_maps_tilt_normals_by_the_slope_of_their_grey() {
         assert!(found.distance(DVec3::from_array(expected)) < 2e-3, "{text}: {found}");
     }
 }
+
+/// Grey 60 of 255 in the working space, as POV-Ray 3.7 reads it from PNG files with and without a gamma.
+#[test]
+fn images_are_decoded_by_their_gamma_and_the_version() {
+    use lumbre_shading::MaterialKind;
+    use lumbre_shading::pov::{PigmentKind, TextureKind};
+
+    let folder = std::env::temp_dir().join(format!("lumbre-pov-gamma-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    for (name, gamma) in [("none.png", None), ("screen.png", Some(45_455)), ("light.png", Some(100_000))] {
+        let file = std::fs::File::create(folder.join(name)).unwrap();
+        let mut encoder = png::Encoder::new(file, 3, 2);
+        encoder.set_color(png::ColorType::Rgb);
+        if let Some(gamma) = gamma {
+            encoder.set_source_gamma(png::ScaledFloat::from_scaled(gamma));
+        }
+        encoder.write_header().unwrap().write_image_data(&[60; 18]).unwrap();
+    }
+    let (stored, screen) = (60.0 / 255.0, 0.0415);
+    for (version, settings, image, expected) in [
+        ("3.6", "assumed_gamma 1", "\"none.png\"", stored),
+        ("3.6", "assumed_gamma 1", "\"screen.png\"", screen),
+        ("3.6", "assumed_gamma 1", "\"light.png\"", stored),
+        ("3.6", "assumed_gamma 2.2", "\"none.png\"", stored),
+        ("3.6", "assumed_gamma 2.2", "\"screen.png\"", stored),
+        ("3.6", "", "\"none.png\"", stored),
+        ("3.6", "", "\"screen.png\"", stored),
+        ("3.7", "assumed_gamma 1", "\"none.png\"", 0.0452),
+        ("3.7", "assumed_gamma 1", "\"screen.png\"", screen),
+        ("3.7", "assumed_gamma 1", "\"light.png\"", stored),
+        ("3.7", "assumed_gamma 2.2", "\"light.png\"", 0.518),
+        ("3.7", "", "\"screen.png\"", screen),
+        ("3.7", "assumed_gamma 1", "\"none.png\" gamma 1", stored),
+        ("3.7", "assumed_gamma 1", "\"none.png\" gamma 2.2", screen),
+    ] {
+        let text = format!(
+            "#version {version}; global_settings {{ {settings} }} sphere {{ 0, 1 pigment {{ image_map {{ png {image} }} }} }}"
+        );
+        let budget = Budget::default();
+        let input = Input::from_reader("a.pov", text.as_bytes(), &budget).unwrap();
+        let options = PovOptions::default();
+        let mut diagnostics = Diagnostics::new();
+        let scene = lumbre_formats::pov::pov_scene(&input, &folder, &options, &budget, &mut diagnostics);
+        let scene = scene.unwrap_or_else(|error| panic!("{text}: {error}"));
+        let MaterialKind::Pov(material) = &scene.materials[0].material.kind else { panic!() };
+        let TextureKind::Plain(layer) = &material.texture.kind else { panic!() };
+        let PigmentKind::Image(image) = &layer.pigment.kind else { panic!() };
+        let found = image.colour(lumbre_math::DVec3::new(0.3, 0.7, 0.0)).rgb.g;
+        assert!((found - expected).abs() < 1e-3, "{text}: {found}, not {expected}");
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn switches_may_be_identifiers() {
+    let text = "#macro Settings(Normal) radiosity { count 9 normal Normal media off brightness 0.5 } #end
+        #declare No = 0; #declare Yes = 1;
+        global_settings { Settings(No) }
+        sphere { 0, 1 hollow Yes }
+        sphere { x*3, 1 hollow No pigment { rgb 1 } }";
+    let scene = read(text).0.unwrap();
+    let hollow = scene.materials.iter().map(|named| {
+        let lumbre_shading::MaterialKind::Pov(material) = &named.material.kind else { panic!() };
+        material.hollow
+    });
+    assert_eq!(hollow.collect::<Vec<_>>(), [true, false]);
+}
+
+/// POV-Ray 3.7 gives the normals of maps the `bump_size` of the default normal, too.
+#[test]
+fn the_default_normal_says_how_strong_others_are() {
+    use lumbre_math::DVec3;
+    use lumbre_shading::MaterialKind;
+    use lumbre_shading::pov::{Eye, TextureKind};
+
+    let entry = "gradient x scale 3 translate -x";
+    let map = format!("bumps normal_map {{ [0 {entry}] [1 {entry}] }}");
+    let blocks = format!("checker normal {{ {entry} }} normal {{ {entry} }}");
+    for (default, normal, expected) in [
+        ("", entry, [-0.067, 0.0, -0.998]),
+        ("#default { normal { bump_size 1.5 } }", entry, [-0.196, 0.0, -0.981]),
+        ("#default { normal { bumps 1.5 } }", entry, [-0.196, 0.0, -0.981]),
+        ("", &map, [-0.067, 0.0, -0.998]),
+        ("#default { normal { bump_size 1.5 } }", &map, [-0.196, 0.0, -0.981]),
+        ("#default { normal { bump_size 1.5 } }", &blocks, [-0.196, 0.0, -0.981]),
+    ] {
+        let scene = read(&format!("{default} sphere {{ 0, 1 normal {{ {normal} }} }}")).0.unwrap();
+        let MaterialKind::Pov(material) = &scene.materials[0].material.kind else { panic!() };
+        let TextureKind::Plain(layer) = &material.texture.kind else { panic!() };
+        let n = -DVec3::Z;
+        let eye = Eye { normal: n, ..Eye::NOWHERE };
+        let found = layer.normal.as_ref().unwrap().tilted(DVec3::new(0.5, 0.5, 0.0), n, &eye);
+        assert!(found.distance(DVec3::from_array(expected)) < 2e-3, "{default} {normal}: {found}");
+    }
+}
+
+/// The octaves of an image's turbulence may stand behind it.
+#[test]
+fn octaves_behind_the_turbulence_of_an_image_count() {
+    use lumbre_math::DVec3;
+    use lumbre_shading::MaterialKind;
+    use lumbre_shading::pov::TextureKind;
+
+    let place = |modifiers: &str| {
+        let text = format!(
+            "sphere {{ 0, 1 pigment {{ image_map {{ function 4, 4 {{ x }} }} scale 2 {modifiers} rotate 90*z }} }}"
+        );
+        let scene = read(&text).0.unwrap();
+        let MaterialKind::Pov(material) = &scene.materials[0].material.kind else { panic!() };
+        let TextureKind::Plain(layer) = &material.texture.kind else { panic!() };
+        layer.pigment.warps.apply(DVec3::new(0.3, -0.8, 0.45))
+    };
+    let two = place("octaves 2 omega 0.7 turbulence 0.4*x");
+    assert_eq!(place("turbulence 0.4*x octaves 2 omega 0.7"), two);
+    assert_ne!(place("turbulence 0.4*x"), two);
+    assert_ne!(place(""), two);
+}

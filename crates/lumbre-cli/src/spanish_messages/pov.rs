@@ -139,7 +139,6 @@ pub(super) const POV: &[(&str, &str)] = &[
         "the transparency of single colours of a palette is not rendered",
         "la transparencia de colores sueltos de una paleta no se representa",
     ),
-    ("the gamma of an image is that of its file", "la gamma de una imagen es la de su archivo"),
     ("{} has no meaning for an image", "{=} no significa nada en una imagen"),
     ("an image that is not there", "una imagen que no existe"),
     (

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use lumbre_image::Encoding;
+use lumbre_math::Elementary;
 use lumbre_shading::Spectrum;
 use lumbre_shading::pov::{Colour, ImageMap, ImageProjection, ImageSource};
 
@@ -10,7 +11,19 @@ use super::lexer::Kind;
 use super::palette::Indexed;
 use super::{Parser, Result};
 use crate::diagnostic::quoted;
+use crate::image::ImageFormat;
 use crate::{Diagnostic, Input};
+
+/// What the numbers of a file are.
+#[derive(Clone, Copy, PartialEq)]
+enum Decoding {
+    /// Those of a screen, or light where the format has light.
+    Usual,
+    /// Light by this power of them.
+    Power(f64),
+    /// Colours of the working space, or heights.
+    Stored,
+}
 
 /// What an image is for.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -68,12 +81,6 @@ impl Parser<'_, '_> {
                         self.budget.bytes(size_of::<(bool, f64, f32)>() as u64, "colours of an image")?;
                         of_colours.push((&*word == "filter", index, self.finite()? as f32));
                     }
-                }
-                "gamma" => {
-                    if !self.take_word("srgb")? {
-                        self.float()?;
-                    }
-                    self.warn("the gamma of an image is that of its file");
                 }
                 "bump_size" if purpose == Use::Heights => bump_size = Some(self.finite()?),
                 "use_index" if purpose == Use::Heights => by_index = true,
@@ -156,25 +163,33 @@ impl Parser<'_, '_> {
             let wrong = Diagnostic::error("an image that is not there").found(quoted(&name));
             return Err(self.diagnostic(wrong).into());
         };
+        let given = if !self.take_word("gamma")? {
+            None
+        } else if self.take_word("srgb")? {
+            Some(Decoding::Usual)
+        } else {
+            Some(Decoding::Power(self.finite()?.clamp(0.01, 100.0)))
+        };
         let input = Input::open(&path, self.budget)?;
+        let decoding = given.unwrap_or_else(|| self.usual_decoding(&input, purpose));
         let indexed = Indexed::read(&input, self.budget)?;
         if let Some(indexed) = indexed.as_ref().filter(|_| input.starts_with(b"GIF")) {
             (image.width, image.height) = (indexed.width, indexed.height);
             let mut pixels = self.budget.vec(indexed.indices.len() as u64, "pixels")?;
             pixels.extend((0..indexed.indices.len()).map(|i| {
                 let [r, g, b] = indexed.colour(i).map(|c| f64::from(c) / 255.0);
-                let [r, g, b, ..] = match purpose {
-                    Use::Colours => self.settings.from_srgb([r, g, b, 0.0, 0.0]),
-                    Use::Heights => [r, g, b, 0.0, 0.0],
-                };
-                Colour::opaque(Spectrum::new(r as f32, g as f32, b as f32))
+                if decoding == Decoding::Usual {
+                    let [r, g, b, ..] = self.settings.from_srgb([r, g, b, 0.0, 0.0]);
+                    return Colour::opaque(Spectrum::new(r as f32, g as f32, b as f32));
+                }
+                Colour::opaque(self.decoded(Spectrum::new(r as f32, g as f32, b as f32), decoding, purpose))
             }));
             image.source = ImageSource::Pixels(pixels.into());
             return Ok((image, Some(indexed.indices.clone())));
         }
         let read = crate::image::read_image(&input, input.name(), self.budget, self.diagnostics);
         let read = read.map(|mut file| {
-            if purpose == Use::Heights {
+            if decoding != Decoding::Usual {
                 file.bitmap = file.bitmap.with_encoding(Encoding::Linear);
             }
             file
@@ -187,14 +202,13 @@ impl Parser<'_, '_> {
                 for y in 0..image.height {
                     for x in 0..image.width {
                         let rgb = read.pixel(x, y);
-                        let c = Spectrum::new(rgb.r, rgb.g, rgb.b);
+                        let c = self.decoded(Spectrum::new(rgb.r, rgb.g, rgb.b), decoding, purpose);
                         let alpha = read.alpha().map_or(1.0, |alpha| alpha[(y * image.width + x) as usize]);
                         if purpose == Use::Heights {
                             // In front of black.
                             pixels.push(Colour::opaque(c * alpha));
                             continue;
                         }
-                        let c = self.settings.from_linear(c);
                         pixels.push(Colour { transmit: 1.0 - alpha, ..Colour::opaque(c) });
                     }
                 }
@@ -210,5 +224,46 @@ impl Parser<'_, '_> {
         let indices =
             indexed.filter(|indexed| (indexed.width, indexed.height) == (image.width, image.height));
         Ok((image, indices.map(|indexed| indexed.indices)))
+    }
+
+    /// How an image is decoded whose gamma the scene does not give.
+    fn usual_decoding(&self, bytes: &[u8], purpose: Use) -> Decoding {
+        if purpose == Use::Heights {
+            return Decoding::Stored;
+        }
+        let is_old = self.settings.version < 3.7;
+        let is_of_light = ImageFormat::from_bytes(bytes).is_some_and(ImageFormat::is_high_range);
+        match png_gamma(bytes) {
+            Some(gamma) if !is_old || self.settings.assumed_gamma.is_some() => Decoding::Power(1.0 / gamma),
+            _ if is_old && !is_of_light => Decoding::Stored,
+            _ => Decoding::Usual,
+        }
+    }
+
+    /// A colour in the working space, or a height: of light, if it is decoded as usual, else of the numbers of the file.
+    fn decoded(&self, c: Spectrum, decoding: Decoding, purpose: Use) -> Spectrum {
+        let light = match decoding {
+            Decoding::Usual => c,
+            Decoding::Power(power) => c.map(|c| c.max(0.0).power(power as f32)),
+            Decoding::Stored => return c,
+        };
+        if purpose == Use::Heights { light } else { self.settings.from_linear(light) }
+    }
+}
+
+/// The gamma that a PNG file gives: 1 for light, 1/2.2 for most screens.
+fn png_gamma(bytes: &[u8]) -> Option<f64> {
+    let mut rest = bytes.strip_prefix(b"\x89PNG\r\n\x1a\n")?;
+    loop {
+        let length = u32::from_be_bytes(*rest.first_chunk()?) as usize;
+        let (name, data) = rest.get(4..)?.split_at_checked(4)?;
+        match name {
+            b"gAMA" => {
+                let gamma = u32::from_be_bytes(*data.first_chunk()?);
+                return (gamma > 0).then_some(f64::from(gamma) / 1e5);
+            }
+            b"IDAT" | b"IEND" => return None,
+            _ => rest = data.get(length.checked_add(4)?..)?,
+        }
     }
 }

@@ -267,7 +267,9 @@ impl Parser<'_, '_> {
     /// A normal up to a closing mark.
     pub(super) fn normal_body(&mut self, base: Option<Arc<Normal>>, end: u8) -> Result<Arc<Normal>> {
         let mut draft = Draft::new(None, Warps::default(), false);
-        let mut amount = DEFAULT_BUMPS;
+        // That of a default normal holds for all others, too, and for those in their maps.
+        let usual = self.defaults.layer.normal.as_ref().map_or(DEFAULT_BUMPS, |normal| normal.amount);
+        let mut amount = usual;
         let mut accuracy = 0.02;
         let mut no_bump_scale = false;
         let mut special: Option<Rc<str>> = None;
@@ -309,7 +311,7 @@ impl Parser<'_, '_> {
             if let Some(found) = self.pattern_kind(&word)? {
                 draft.begin(found, self.settings.generator);
                 special = Some(word);
-                amount = DEFAULT_BUMPS;
+                amount = usual;
                 continue;
             }
             if self.pattern_modifier(&word, &mut draft)? {
@@ -334,7 +336,7 @@ impl Parser<'_, '_> {
                 "bump_map" => {
                     self.expect(b'{')?;
                     let (image, bump_size) = self.bump_map_body()?;
-                    amount = bump_size.unwrap_or(DEFAULT_BUMPS);
+                    amount = bump_size.unwrap_or(usual);
                     bump_map = Some(Box::new(image));
                 }
                 "facets" | "density_file" | "tiling" | "pavement" => {
