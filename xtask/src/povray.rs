@@ -117,7 +117,11 @@ impl Corpus {
         } else {
             (pictures.join("lumbre.pfm"), pictures.join("povray.ppm"))
         };
-        let run = run_lumbre(program, scene, &ours, &self.switches(scene), limit)?;
+        let mut switches = self.switches(scene);
+        if has_many_rays(scene) {
+            switches.retain(|switch| switch != "-A");
+        }
+        let run = run_lumbre(program, scene, &ours, &switches, limit)?;
         let of_kind = |kind: &str| -> Vec<String> {
             let lines = run.said.lines().filter_map(|line| line.trim().strip_prefix(kind));
             let mut found: Vec<String> = lines.map(without_place).collect();
@@ -150,7 +154,7 @@ impl Corpus {
         Ok(Outcome { error, warnings, agreement: Agreement::Known { share, mean } })
     }
 
-    /// The switches that both programs are given: one ray through the middle of each pixel.
+    /// The switches that POV-Ray is given: one ray through the middle of each pixel, unless the camera has several.
     fn switches(&self, scene: &Path) -> Vec<String> {
         let mut switches = vec![format!("+W{}", self.size[0]), format!("+H{}", self.size[1]), "-A".into()];
         // Its scenes are frames of an animation; those at the number 0 do not exist.
@@ -159,6 +163,14 @@ impl Corpus {
         }
         switches
     }
+}
+
+/// Whether the camera of a scene may have several rays for each pixel: Lumbre takes one of them with `-A`, where POV-Ray
+/// takes all.
+fn has_many_rays(scene: &Path) -> bool {
+    let bytes = std::fs::read(scene).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes);
+    ["aperture ", "mesh_camera{", "mesh_camera {"].iter().any(|words| text.contains(words))
 }
 
 impl Outcome {

@@ -634,6 +634,7 @@ pub(crate) fn camera(scene: &Scene, wanted: &str) -> Result<usize, Failure> {
                 (None, CameraKind::Orthographic { .. }) => format!("{i} (orthographic)"),
                 (None, CameraKind::Spherical { .. }) => format!("{i} (spherical)"),
                 (None, CameraKind::Realistic(_)) => format!("{i} (realistic)"),
+                (None, CameraKind::Mesh(_)) => format!("{i} (mesh)"),
             })
             .collect();
         Failure::Usage(format!(

@@ -678,6 +678,7 @@ mod tests {
         "is orthographic (expected --zoom)",
         "sees all directions",
         "has the lens of the scene",
+        "has the faces of meshes",
         " (but the system grants no more: see ulimit -v)",
         " (but the control group has no more: see its memory.max)",
         "raise it with --max-memory{}",

@@ -125,6 +125,10 @@ impl ViewArguments {
                 let option = self.fov.map(|_| "--fov").or(self.zoom.map(|_| "--zoom"));
                 option.map(|option| (option, "has the lens of the scene"))
             }
+            CameraKind::Mesh(_) => {
+                let option = self.fov.map(|_| "--fov").or(self.zoom.map(|_| "--zoom"));
+                option.map(|option| (option, "has the faces of meshes"))
+            }
         };
         match refused {
             Some((option, why)) => Err(Failure::Usage(format!("{option}: {name} {why}"))),

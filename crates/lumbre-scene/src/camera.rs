@@ -11,7 +11,7 @@ use lumbre_math::{
 use lumbre_simd::{Double, Real, V3};
 
 use crate::viewpoint::half_window;
-use crate::{BuildError, Footprint, Lens, MediumId};
+use crate::{BuildError, Footprint, Lens, MediumId, MeshCamera};
 
 /// The mapping of directions to the picture of a spherical camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -150,6 +150,8 @@ pub enum CameraKind {
     },
     /// A lens of several surfaces before a film; units of the world are metres.
     Realistic(Arc<Lens>),
+    /// Faces of meshes in the world, each of which a ray leaves; the placement of the camera does not move them.
+    Mesh(Arc<MeshCamera>),
 }
 
 impl CameraKind {
@@ -160,6 +162,7 @@ impl CameraKind {
             Self::Orthographic { .. } => "orthographic",
             Self::Spherical { .. } => "spherical",
             Self::Realistic(_) => "realistic",
+            Self::Mesh(_) => "mesh",
         }
     }
 }
@@ -302,7 +305,7 @@ pub struct CameraRay {
     /// The rays through neighbouring points of the film.
     pub footprint: Footprint,
     /// The factor from the radiance of the ray to the picture: 1, except for real lenses. 0 if the lens stops the ray,
-    /// or outside of the visible part of a wide camera.
+    /// outside of the visible part of a wide camera, or where a mesh has no face for it.
     pub weight: f64,
 }
 
@@ -320,7 +323,8 @@ pub struct View {
     medium: Option<MediumId>,
     clip: Option<ClipPlane>,
     // The screen position of the film's (0, 0), and the size of a pixel on the screen. The screen of a
-    // perspective camera is at z = 1, that of a spherical one is the unit square, that of a lens its film.
+    // perspective camera is at z = 1, that of a spherical one is the unit square, that of a lens its film, that of
+    // meshes the film in pixels.
     corner: DVec2,
     step: DVec2,
     size: [u32; 2],
@@ -340,6 +344,7 @@ impl View {
             }
             CameraKind::Orthographic { .. } => (DVec2::new(x0, y1), DVec2::new(x1, y0)),
             CameraKind::Spherical { .. } => (DVec2::ZERO, DVec2::ONE),
+            CameraKind::Mesh(_) => (DVec2::ZERO, pixels),
             // A lens inverts its picture.
             CameraKind::Realistic(ref lens) => {
                 let half = lens.half_film(pixels.x / pixels.y);
@@ -403,12 +408,12 @@ impl View {
     }
 
     /// The depth of a world-space point along the camera's axis at a time; for a spherical camera, the
-    /// distance.
+    /// distance; for one of meshes, which has no axis, the distance from the origin of its space.
     pub fn depth(&self, point: DVec3, time: f64) -> f64 {
         let placement = self.placement(time);
         let local = placement.inverse_point(point);
         match self.kind {
-            CameraKind::Spherical { .. } => placement.vector(local).length(),
+            CameraKind::Spherical { .. } | CameraKind::Mesh(_) => placement.vector(local).length(),
             _ => placement.vector(DVec3::Z).length() * local.z,
         }
     }
@@ -423,12 +428,12 @@ impl View {
 
     /// The screen position of a film point: for a perspective camera at z = 1 of camera space, with x to the right and
     /// y up; for an orthographic one at z = 0; for a spherical one in the unit square; for a real lens on its film at z
-    /// = 0, in metres, with the picture inverted.
+    /// = 0, in metres, with the picture inverted; for meshes the film point itself.
     pub fn on_screen(&self, film: DVec2) -> DVec2 {
         self.corner + self.step * film
     }
 
-    /// Whether rays start at points of a lens.
+    /// Whether rays depend on points of a lens: where they start, or which of the rays of a pixel they are.
     pub fn has_lens(&self) -> bool {
         match self.kind {
             CameraKind::Perspective { lens_radius, .. } | CameraKind::Orthographic { lens_radius, .. } => {
@@ -436,6 +441,7 @@ impl View {
             }
             CameraKind::Spherical { .. } => false,
             CameraKind::Realistic(_) => true,
+            CameraKind::Mesh(ref meshes) => meshes.rays() > 1,
         }
     }
 
@@ -484,6 +490,12 @@ impl View {
                     glass.ray(on_screen, lens).unwrap_or((DVec3::ZERO, DVec3::Z, 0.0));
                 weight = share;
                 (origin, direction)
+            }
+            CameraKind::Mesh(ref meshes) => {
+                let Some((origin, direction)) = meshes.line(film, lens.x, self.size) else {
+                    return (DVec3::ZERO, DVec3::Z, 0.0);
+                };
+                return (origin, direction.normalize(), 1.0);
             }
         };
         let (origin, direction) = (placement.point(origin), placement.vector(direction).normalize());
@@ -552,7 +564,7 @@ pub(crate) fn check(cameras: &[Camera]) -> Result<(), BuildError> {
                 Some((lens_radius, focal_distance))
             }
             CameraKind::Orthographic { lens_radius, focal_distance } => Some((lens_radius, focal_distance)),
-            CameraKind::Spherical { .. } | CameraKind::Realistic(_) => None,
+            CameraKind::Spherical { .. } | CameraKind::Realistic(_) | CameraKind::Mesh(_) => None,
         };
         if let Some((radius, distance)) = lens {
             if !(radius >= 0.0 && radius.is_finite()) {

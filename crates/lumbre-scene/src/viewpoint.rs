@@ -69,7 +69,7 @@ impl Viewpoint {
         }
         let aspect = camera.frame_aspect.unwrap_or(aspect);
         match (&mut camera.kind, camera.screen_window) {
-            (CameraKind::Spherical { .. } | CameraKind::Realistic(_), _) => {}
+            (CameraKind::Spherical { .. } | CameraKind::Realistic(_) | CameraKind::Mesh(_), _) => {}
             (CameraKind::Perspective { fov, .. }, None) => {
                 *fov = 2.0 * ((0.5 * fov.to_radians()).tangent() / self.zoom).arc_tangent().to_degrees();
             }

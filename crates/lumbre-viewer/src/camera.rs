@@ -57,6 +57,8 @@ pub(crate) fn moved(
         CameraKind::Orthographic { .. } if (1e-6..=1e6).contains(&zoom) => {
             place = place * Transform::scale(DVec3::new(1.0 / zoom, 1.0 / zoom, 1.0)).ok()?;
         }
+        // Faces of meshes stay where they are.
+        CameraKind::Mesh(_) => return None,
         CameraKind::Orthographic { .. } | CameraKind::Spherical { .. } | CameraKind::Realistic(_) => {}
     }
     camera.world_from_camera = place;

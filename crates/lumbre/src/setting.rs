@@ -273,6 +273,7 @@ impl Setting {
                 CameraKind::Orthographic { .. } => (&["lensradius", "focaldistance"], "orthographic"),
                 CameraKind::Spherical { .. } => (&[], "spherical"),
                 CameraKind::Realistic(_) => (&[], "realistic"),
+                CameraKind::Mesh(_) => (&[], "mesh"),
             };
             let slot = match (&mut camera.kind, &*self.parameter) {
                 (CameraKind::Perspective { fov, .. }, "fov") => Slot::Double(fov, Range(0.001, 179.0)),

@@ -126,6 +126,7 @@ fn kind(kind: &CameraKind, texts: &Texts) -> String {
         }
         CameraKind::Orthographic { .. } => texts.orthographic.to_owned(),
         CameraKind::Spherical { .. } => texts.spherical.to_owned(),
+        CameraKind::Mesh(_) => texts.of_meshes.to_owned(),
         CameraKind::Realistic(lens) => {
             let mm = [lens.focal_length(), lens.film_distance(), lens.diagonal()];
             let mm = mm.map(|metres| super::numbers::exact((1e6 * metres).rounded() / 1e3));
@@ -168,7 +169,7 @@ fn projection(kind: &CameraKind, view: &CameraView, (width, height): (u32, u32))
             .try_into()
             .ok()?,
         )),
-        CameraKind::Spherical { .. } | CameraKind::Realistic(_) => None,
+        CameraKind::Spherical { .. } | CameraKind::Realistic(_) | CameraKind::Mesh(_) => None,
     }
 }
 

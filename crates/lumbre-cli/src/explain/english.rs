@@ -30,6 +30,7 @@ pub(super) static ENGLISH: Texts = Texts {
     orthographic: "orthographic",
     spherical: "spherical, all directions at once",
     realistic: "a real lens of focal length {0} mm, {1} mm before the film, whose diagonal is {2} mm",
+    of_meshes: "the faces of meshes, which rays leave",
     pixel: "pixel",
     film_point: "point of the film, in pixels from the upper left corner",
     screen_point: "point of the screen (at a distance of 1 for a perspective)",

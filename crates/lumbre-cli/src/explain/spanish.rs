@@ -30,6 +30,7 @@ pub(super) static SPANISH: Texts = Texts {
     orthographic: "ortográfica",
     spherical: "esférica, todas las direcciones a la vez",
     realistic: "un objetivo real de distancia focal {0} mm, a {1} mm de la película, cuya diagonal mide {2} mm",
+    of_meshes: "las caras de mallas, de las que salen los rayos",
     pixel: "píxel",
     film_point: "punto de la película, en píxeles desde la esquina superior izquierda",
     screen_point: "punto de la pantalla (a distancia 1 en una perspectiva)",

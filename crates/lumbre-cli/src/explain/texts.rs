@@ -41,6 +41,7 @@ pub(super) struct Texts {
     pub(super) orthographic: &'static str,
     pub(super) spherical: &'static str,
     pub(super) realistic: &'static str,
+    pub(super) of_meshes: &'static str,
     pub(super) pixel: &'static str,
     pub(super) film_point: &'static str,
     pub(super) screen_point: &'static str,

@@ -91,6 +91,8 @@ pub(super) const COUNTED: &[(&str, &str)] = &[
     ("triangles of a height field", "los triángulos de un campo de alturas"),
     ("triangles of a patch", "los triángulos de una superficie"),
     ("vectors of a mesh2", "los vectores de un mesh2"),
+    ("faces of a camera", "las caras de una cámara"),
+    ("meshes of a camera", "las mallas de una cámara"),
     ("vertices", "los vértices"),
     ("vertices that bend", "los vértices que se deforman"),
     ("voxels", "los vóxeles"),

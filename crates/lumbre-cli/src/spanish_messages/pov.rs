@@ -24,6 +24,11 @@ pub(super) const POV: &[(&str, &str)] = &[
     ("what a camera has", "lo que tiene una cámara"),
     ("the camera omnimax is rendered in perspective", "la cámara omnimax se representa en perspectiva"),
     ("the camera {} is rendered in perspective", "la cámara {=} se representa en perspectiva"),
+    ("a mesh_camera without meshes", "un mesh_camera sin mallas"),
+    (
+        "the greatest distance of a mesh_camera has no effect",
+        "la distancia máxima de un mesh_camera no tiene efecto",
+    ),
     ("the normal of a camera is not rendered", "la normal de una cámara no se representa"),
     ("a camera is needed, not {}", "se necesita una cámara, no {}"),
     ("{} has no meaning for a camera", "{=} no significa nada en una cámara"),
@@ -134,7 +139,6 @@ pub(super) const POV: &[(&str, &str)] = &[
         "the transparency of single colours of a palette is not rendered",
         "la transparencia de colores sueltos de una paleta no se representa",
     ),
-    ("the gamma of an image is that of its file", "la gamma de una imagen es la de su archivo"),
     ("{} has no meaning for an image", "{=} no significa nada en una imagen"),
     ("an image that is not there", "una imagen que no existe"),
     (

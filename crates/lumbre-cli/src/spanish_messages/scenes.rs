@@ -448,6 +448,8 @@ pub(super) const SCENES: &[(&str, &str)] = &[
     ("{}: camera {} sees all directions", "{=}: la cámara {} ve en todas las direcciones"),
     ("{}: the camera has the lens of the scene", "{=}: la cámara tiene el objetivo de la escena"),
     ("{}: camera {} has the lens of the scene", "{=}: la cámara {} tiene el objetivo de la escena"),
+    ("{}: the camera has the faces of meshes", "{=}: la cámara tiene las caras de mallas"),
+    ("{}: camera {} has the faces of meshes", "{=}: la cámara {} tiene las caras de mallas"),
     ("building the scene", "la construcción de la escena"),
     ("a picture of {} by {} pixels", "una imagen de {} por {} píxeles"),
     (

@@ -38,7 +38,8 @@ struct Key {
     global: bool,
 }
 
-/// Minimum number of samples per pixel with a lens, whose blur is noise otherwise.
+/// Minimum number of samples per pixel of a camera with a lens, or with several rays for each pixel, whose mean is noise
+/// otherwise.
 const MIN_BLUR_SAMPLES: u32 = 64;
 
 /// A description that is being made.
@@ -100,9 +101,7 @@ impl Parser<'_, '_> {
         self.around(&mut scene, gamma, camera.location, builder.around_eye);
         match camera.camera() {
             Some(made) => {
-                if camera.has_lens() {
-                    scene.sampler.spp = Some(camera.blur_samples.max(MIN_BLUR_SAMPLES));
-                }
+                scene.sampler.spp = camera.samples().map(|samples| samples.max(MIN_BLUR_SAMPLES));
                 scene.cameras.push(made);
             }
             None => return Err(Diagnostic::error("the axes of the camera lie in a plane").into()),

@@ -1,13 +1,22 @@
 //! Cameras.
 
+use std::collections::HashMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Elementary, Transform};
-use lumbre_scene::{Camera, CameraKind, SphericalMapping, WideProjection};
+use lumbre_scene::{
+    Camera, CameraFace, CameraKind, FaceChoice, MeshCamera, MeshDesc, SphericalMapping, WideProjection,
+};
 
 use super::lexer::Kind;
+use super::meshes::camera_faces;
+use super::objects::{Form, Object};
 use super::value::Value;
 use super::{Parser, Result};
+
+/// The radius of the lens of aperture 1: in POV-Ray's pictures, points out of focus blur to discs of this size.
+const LENS_RADIUS: f64 = 0.25;
 
 /// A camera as the scene describes it.
 #[derive(Clone, Debug)]
@@ -28,6 +37,17 @@ pub(super) struct CameraStatement {
     pub blur_samples: u32,
     /// Whether the scene gives its frame.
     pub has_frame: bool,
+    /// What its rays leave, if it is a `mesh_camera`.
+    pub faces: Option<Rc<Faces>>,
+}
+
+/// The meshes of a `mesh_camera`.
+#[derive(Debug)]
+pub(super) struct Faces {
+    choice: FaceChoice,
+    /// Of each pixel.
+    rays: u32,
+    meshes: Vec<(Arc<[CameraFace]>, Transform)>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +77,7 @@ impl CameraStatement {
         focal_point: None,
         blur_samples: 0,
         has_frame: false,
+        faces: None,
     };
 
     /// Width over height of the picture that it is made for.
@@ -110,8 +131,21 @@ impl CameraStatement {
         self.aperture > 0.0 && self.focal_point.is_some()
     }
 
+    /// Samples of each pixel that it asks for, if its rays are not all alike.
+    pub(super) fn samples(&self) -> Option<u32> {
+        match &self.faces {
+            Some(faces) => Some(faces.rays).filter(|rays| *rays > 1),
+            None => Some(self.blur_samples).filter(|_| self.has_lens()),
+        }
+    }
+
     /// The camera of the scene; `None` if its axes lie in a plane.
     pub(super) fn camera(&self) -> Option<Camera> {
+        if let Some(Faces { choice, rays, meshes }) = self.faces.as_deref() {
+            let is_reversed = self.direction.z < 0.0;
+            let camera = MeshCamera::new(*choice, *rays, meshes.clone(), self.location.z, is_reversed);
+            return Some(Camera::new(CameraKind::Mesh(Arc::new(camera)), Transform::IDENTITY));
+        }
         let (right, up, direction) = (self.right, self.up, self.direction);
         let lengths = DVec3::new(right.length(), up.length(), direction.length());
         let is_square = right.dot(up).abs() < 1e-9 * lengths.x * lengths.y
@@ -129,7 +163,8 @@ impl CameraStatement {
         };
         let map = Transform::from_affine(DAffine3 { matrix3: axes, translation: self.location }).ok()?;
         let focal_distance = self.focal_point.map_or(1.0, |p| map.inverse_point(p).z);
-        let lens_radius = if self.has_lens() && focal_distance > 0.0 { 0.5 * self.aperture } else { 0.0 };
+        let lens_radius =
+            if self.has_lens() && focal_distance > 0.0 { LENS_RADIUS * self.aperture } else { 0.0 };
         if let Some(wide) = self.wide(lengths) {
             let mapping = SphericalMapping::Wide(wide);
             return Some(Camera::new(CameraKind::Spherical { mapping }, map));
@@ -203,8 +238,9 @@ impl Parser<'_, '_> {
                 "spherical" => camera.kind = Projection::Spherical,
                 "omnimax" => self.warn("the camera omnimax is rendered in perspective"),
                 "cylinder" => camera.kind = Projection::Cylinder(self.whole(1.0, 4.0)?),
-                "mesh_camera" | "user_defined" => {
-                    self.warn(&format!("the camera {word} is rendered in perspective"));
+                "mesh_camera" => camera.faces = Some(Rc::new(self.faces()?)),
+                "user_defined" => {
+                    self.warn("the camera user_defined is rendered in perspective");
                     self.expect(b'{')?;
                     self.skip_to(b'}')?;
                 }
@@ -279,6 +315,67 @@ impl Parser<'_, '_> {
         }
         self.declaring = outer;
         Ok(camera)
+    }
+
+    /// The meshes of a `mesh_camera`.
+    fn faces(&mut self) -> Result<Faces> {
+        self.expect(b'{')?;
+        let rays = self.whole(1.0, 65_536.0)?;
+        self.comma()?;
+        let distribution = self.whole(0.0, 3.0)?;
+        self.comma()?;
+        let mut is_smooth = false;
+        let mut meshes = Vec::new();
+        // A mesh that is there many times has its faces once.
+        let mut known: HashMap<usize, (Arc<MeshDesc>, Arc<[CameraFace]>)> = HashMap::new();
+        while !self.take(b'}')? {
+            if self.take(b',')? {
+                continue;
+            }
+            if self.take_word("smooth")? {
+                is_smooth = true;
+            } else if matches!(self.word()?.as_deref(), Some("mesh" | "mesh2")) {
+                let Some(object) = self.object()? else { return Err(self.unexpected("a mesh")) };
+                let mut found = Vec::new();
+                meshes_of(&object, &Transform::IDENTITY, &mut found);
+                for (mesh, map) in found {
+                    let key = Arc::as_ptr(&mesh) as usize;
+                    if !known.contains_key(&key) {
+                        let count = mesh.triangles.len() as u64;
+                        self.budget.bytes(count * size_of::<CameraFace>() as u64, "faces of a camera")?;
+                        let faces = camera_faces(&mesh);
+                        known.insert(key, (mesh, faces));
+                    }
+                    let size = size_of::<(Arc<[CameraFace]>, Transform)>();
+                    self.budget.bytes(size as u64, "meshes of a camera")?;
+                    meshes.push((Arc::clone(&known[&key].1), map));
+                }
+            } else if self.float()? > 0.0 {
+                self.warn("the greatest distance of a mesh_camera has no effect");
+            }
+        }
+        if meshes.is_empty() {
+            return Err(self.error("a mesh_camera without meshes"));
+        }
+        let choice = match distribution {
+            0 => FaceChoice::MeshPerRay,
+            1 => FaceChoice::Joined,
+            2 => FaceChoice::SideBySide,
+            _ => FaceChoice::ByUv { is_smooth },
+        };
+        // The others have but one.
+        let rays = if distribution < 2 { rays } else { 1 };
+        Ok(Faces { choice, rays, meshes })
+    }
+}
+
+/// The meshes that an object consists of, with their places.
+fn meshes_of(object: &Object, parent: &Transform, found: &mut Vec<(Arc<MeshDesc>, Transform)>) {
+    let map = *parent * object.transform;
+    match &object.form {
+        Form::Mesh(mesh, _) => found.push((Arc::clone(mesh), map)),
+        Form::Group(_, parts) => parts.iter().for_each(|part| meshes_of(part, &map, found)),
+        _ => {}
     }
 }
 

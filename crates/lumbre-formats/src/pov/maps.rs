@@ -88,7 +88,7 @@ impl Parser<'_, '_> {
     }
 
     /// Whether a number comes next.
-    fn is_number(&mut self) -> Result<bool> {
+    pub(super) fn is_number(&mut self) -> Result<bool> {
         let word = match self.peek()? {
             Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'!')) => return Ok(true),
             Some(Kind::Word(word)) => Rc::clone(word),

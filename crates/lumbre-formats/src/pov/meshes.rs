@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_math::{DVec2, DVec3, Vec2, Vec3};
-use lumbre_scene::MeshDesc;
+use lumbre_scene::{CameraFace, MeshDesc};
 use lumbre_shading::pov::Texture;
 
 use super::blob::{Ball, Blob};
@@ -20,6 +20,8 @@ struct Triangles {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
     uvs: Vec<Vec2>,
+    /// Their corners, in an order that has the front where most of the normals point.
+    corners: Vec<[u32; 3]>,
     has_normals: bool,
     has_uvs: bool,
 }
@@ -29,9 +31,8 @@ type FaceList = (Vec<[u32; 3]>, Vec<Option<usize>>);
 
 impl Triangles {
     fn mesh(self) -> MeshDesc {
-        let count = self.positions.len() as u32 / 3;
         MeshDesc {
-            triangles: (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            triangles: self.corners,
             normals: self.has_normals.then_some(self.normals),
             uvs: self.has_uvs.then_some(self.uvs),
             positions: self.positions,
@@ -348,14 +349,34 @@ fn push(all: &mut Triangles, corners: [DVec3; 3], normals: Option<[DVec3; 3]>, u
     let normals = normals.unwrap_or([flat; 3]);
     // The front is where most of the normals point.
     let is_turned = normals.iter().sum::<DVec3>().dot(flat) < 0.0;
-    let order = if is_turned { [0, 2, 1] } else { [0, 1, 2] };
-    for i in order {
+    let first = all.positions.len() as u32;
+    all.corners.push(if is_turned { [first, first + 2, first + 1] } else { [first, first + 1, first + 2] });
+    for i in 0..3 {
         all.positions.push(corners[i].as_vec3());
         all.normals.push(normals[i].normalize_or(DVec3::Y).as_vec3());
         let uv = uvs.map_or(DVec2::ZERO, |uvs| uvs[i]);
         all.uvs.push(Vec2::new(uv.x as f32, uv.y as f32));
     }
     all.has_uvs |= uvs.is_some();
+}
+
+/// The faces of a mesh for cameras: corners in the order in which the scene writes them.
+pub(super) fn camera_faces(mesh: &MeshDesc) -> Arc<[CameraFace]> {
+    let face = |triangle: &[u32; 3]| {
+        let mut order = *triangle;
+        order.sort_unstable();
+        let corners = order.map(|i| mesh.positions[i as usize]);
+        let [a, b, c] = corners;
+        let flat = (c - a).cross(b - a);
+        let normals = mesh.normals.as_ref();
+        let uvs = mesh.uvs.as_ref();
+        CameraFace {
+            corners,
+            normals: order.map(|i| normals.map_or(flat, |normals| normals[i as usize])),
+            uvs: order.map(|i| uvs.map_or(Vec2::ZERO, |uvs| uvs[i as usize])),
+        }
+    };
+    mesh.triangles.iter().map(face).collect()
 }
 
 /// What triangles enclose, by a direction to look for them.

@@ -17,6 +17,8 @@ pub(super) struct Draft {
     pub uv: bool,
     /// The octaves that stand before the pattern.
     pub octaves: Octaves,
+    /// Whether the first of the warps is the turbulence of what has no pattern of its own.
+    has_turbulence: bool,
     /// The word that the pattern began with.
     pub word: Rc<str>,
 }
@@ -24,7 +26,7 @@ pub(super) struct Draft {
 impl Draft {
     pub(super) fn new(pattern: Option<Pattern>, warps: Warps, uv: bool) -> Self {
         let octaves = pattern.as_ref().map_or_else(Octaves::default, |pattern| pattern.octaves);
-        Self { pattern, warps, uv, octaves, word: Rc::from("") }
+        Self { pattern, warps, uv, octaves, has_turbulence: false, word: Rc::from("") }
     }
 
     /// Begins a pattern, with the octaves that stood before it.
@@ -186,7 +188,9 @@ impl Parser<'_, '_> {
                             // Of what has no pattern of its own, such as an average or an image: a warp that acts
                             // first.
                             None => {
-                                draft.warps.0.insert(0, Warp::Turbulence { amount, octaves: draft.octaves })
+                                let octaves = draft.octaves;
+                                draft.warps.0.insert(0, Warp::Turbulence { amount, octaves });
+                                draft.has_turbulence = true;
                             }
                         }
                     }
@@ -197,6 +201,10 @@ impl Parser<'_, '_> {
                 }
                 if let Some(pattern) = &mut draft.pattern {
                     pattern.octaves = draft.octaves;
+                } else if draft.has_turbulence
+                    && let Some(Warp::Turbulence { octaves, .. }) = draft.warps.0.first_mut()
+                {
+                    *octaves = draft.octaves;
                 }
                 return Ok(true);
             }
@@ -289,17 +297,7 @@ impl Parser<'_, '_> {
 
     /// A truth that may be left out.
     pub(super) fn optional_bool(&mut self) -> Result<bool> {
-        use super::lexer::Kind;
-        if self.ends_here()? {
-            return Ok(true);
-        }
-        match self.peek()? {
-            Some(Kind::Number(_)) => Ok(self.float()? != 0.0),
-            Some(Kind::Word(word)) if matches!(&**word, "on" | "off" | "yes" | "no" | "true" | "false") => {
-                Ok(self.float()? != 0.0)
-            }
-            _ => Ok(true),
-        }
+        Ok(self.ends_here()? || !self.is_number()? || self.float()? != 0.0)
     }
 
     fn warp(&mut self) -> Result<Vec<Warp>> {

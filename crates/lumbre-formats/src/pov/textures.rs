@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lumbre_math::Transform;
 use lumbre_shading::Spectrum;
 use lumbre_shading::pov::{
-    Colour, ColourMap, Finish, Interior, Layer, Normal, NormalKind, Pattern, PatternKind, Pigment,
+    Colour, ColourMap, Finish, ImageMap, Interior, Layer, Normal, NormalKind, Pattern, PatternKind, Pigment,
     PigmentKind, Texture, TextureKind, Warps,
 };
 
@@ -267,7 +267,9 @@ impl Parser<'_, '_> {
     /// A normal up to a closing mark.
     pub(super) fn normal_body(&mut self, base: Option<Arc<Normal>>, end: u8) -> Result<Arc<Normal>> {
         let mut draft = Draft::new(None, Warps::default(), false);
-        let mut amount = DEFAULT_BUMPS;
+        // That of a default normal holds for all others, too, and for those in their maps.
+        let usual = self.defaults.layer.normal.as_ref().map_or(DEFAULT_BUMPS, |normal| normal.amount);
+        let mut amount = usual;
         let mut accuracy = 0.02;
         let mut no_bump_scale = false;
         let mut special: Option<Rc<str>> = None;
@@ -279,6 +281,7 @@ impl Parser<'_, '_> {
         }
         let mut is_average = false;
         let mut is_ignored = false;
+        let mut bump_map: Option<Box<ImageMap>> = None;
         let mut blocks: Vec<Arc<Normal>> = Vec::new();
         let mut in_pattern = false;
         loop {
@@ -293,7 +296,8 @@ impl Parser<'_, '_> {
                 continue;
             }
             // The amount stands behind the pattern.
-            if (draft.pattern.is_some() || kept.is_some() || is_average || is_ignored)
+            let has_kind = draft.pattern.is_some() || bump_map.is_some() || kept.is_some();
+            if (has_kind || is_average || is_ignored)
                 && let Some(Kind::Number(_) | Kind::Mark(b'-' | b'+' | b'(' | b'.')) = self.peek()?
             {
                 amount = self.finite()?;
@@ -307,7 +311,7 @@ impl Parser<'_, '_> {
             if let Some(found) = self.pattern_kind(&word)? {
                 draft.begin(found, self.settings.generator);
                 special = Some(word);
-                amount = DEFAULT_BUMPS;
+                amount = usual;
                 continue;
             }
             if self.pattern_modifier(&word, &mut draft)? {
@@ -329,7 +333,13 @@ impl Parser<'_, '_> {
                     special = Some(word);
                     in_pattern = true;
                 }
-                "bump_map" | "facets" | "density_file" | "tiling" | "pavement" => {
+                "bump_map" => {
+                    self.expect(b'{')?;
+                    let (image, bump_size) = self.bump_map_body()?;
+                    amount = bump_size.unwrap_or(usual);
+                    bump_map = Some(Box::new(image));
+                }
+                "facets" | "density_file" | "tiling" | "pavement" => {
                     self.warn(&format!("the normal {word} is not rendered"));
                     is_ignored = true;
                     if self.is_mark(b'{')? {
@@ -368,6 +378,8 @@ impl Parser<'_, '_> {
                 Some(Map::Normals(entries)) => NormalKind::Average(entries.clone().into()),
                 _ => return Err(self.error("an average without a map")),
             }
+        } else if let Some(image) = bump_map {
+            NormalKind::BumpMap(image)
         } else if let Some(pattern) = draft.pattern {
             normal_kind(pattern, special.as_deref(), map.as_deref(), blocks)
         } else if let Some(known) = kept.as_ref().filter(|_| !is_ignored) {

@@ -4,6 +4,7 @@
 //! All arithmetic on colours is done in the scene's working space (see `assumed_gamma` of POV-Ray).
 
 mod blocks;
+mod bump_map;
 mod finish;
 mod fractal;
 pub mod function;

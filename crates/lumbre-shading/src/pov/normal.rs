@@ -52,6 +52,8 @@ pub enum NormalKind {
     Quilted(Box<Pattern>),
     /// A pattern by a map of normals.
     Normals(Box<Pattern>, Arc<[(f64, Arc<Normal>)]>),
+    /// The slope of an image whose grey is a height.
+    BumpMap(Box<super::ImageMap>),
     /// A weighted mean.
     Average(Arc<[(f64, Arc<Normal>)]>),
 }
@@ -86,7 +88,7 @@ impl Normal {
             | NormalKind::Waves(pattern)
             | NormalKind::Quilted(pattern)
             | NormalKind::Normals(pattern, _) => Some(pattern),
-            NormalKind::Average(_) => None,
+            NormalKind::BumpMap(_) | NormalKind::Average(_) => None,
         }
     }
 
@@ -106,6 +108,7 @@ impl Normal {
                 let q = p - p.floor() - DVec3::splat(0.5);
                 n + self.amount * quilt_slope(q.length(), control0, control1) * q
             }
+            NormalKind::BumpMap(image) => n + self.amount * image.tilt(p, n),
             NormalKind::Slope { pattern, map } => n + self.slope(pattern, map.as_deref(), p, eye),
             NormalKind::Normals(pattern, map) => {
                 let ([(_, first), (_, second)], share) = between(map, pattern.value(p, eye));

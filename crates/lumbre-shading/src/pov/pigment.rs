@@ -237,7 +237,7 @@ impl ImageMap {
     pub fn colour(&self, p: DVec3) -> Colour {
         let none = Colour { rgb: Spectrum::BLACK, filter: 0.0, transmit: 1.0 };
         let Some([u, v]) = self.place(p) else { return none };
-        let mut colour = if self.interpolate { self.interpolated(u, v) } else { self.nearest(u, v) };
+        let mut colour = self.at(u, v);
         colour.filter += self.filter;
         colour.transmit += self.transmit;
         colour
@@ -248,8 +248,13 @@ impl ImageMap {
         f64::from(self.colour(p).gray())
     }
 
+    /// The colour at a place on the image in [0, 1), without what is added to all.
+    pub(super) fn at(&self, u: f64, v: f64) -> Colour {
+        if self.interpolate { self.interpolated(u, v) } else { self.nearest(u, v) }
+    }
+
     /// The place on the image in [0, 1), from its lower left corner; `None` where there is no image.
-    fn place(&self, p: DVec3) -> Option<[f64; 2]> {
+    pub(super) fn place(&self, p: DVec3) -> Option<[f64; 2]> {
         use std::f64::consts::{PI, TAU};
         let around = |x: f64, z: f64| {
             let turn = z.angle_from(x) / TAU;
