@@ -97,6 +97,27 @@ pub fn roots_between<const N: usize>(c: &[f64; N], low: f64, high: f64) -> RealR
     roots
 }
 
+/// Whether a polynomial certainly has no root in [0, 1]: all its Bernstein coefficients, between which its values lie,
+/// have the same sign, by more than their rounding.
+#[inline]
+pub fn keeps_sign<const N: usize>(c: &[f64; N]) -> bool {
+    // c[i] over the binomial coefficient (N - 1, i); the sums of Pascal's triangle are the coefficients.
+    let mut b = *c;
+    let mut choices = 1.0;
+    for i in 1..N {
+        choices *= (N - i) as f64 / i as f64;
+        b[i] /= choices;
+    }
+    let size = b.iter().map(|x| x.abs()).sum::<f64>() * (1 << N) as f64;
+    for k in 1..N {
+        for i in (k..N).rev() {
+            b[i] += b[i - 1];
+        }
+    }
+    let margin = 1e-14 * size;
+    b.iter().all(|&x| x > margin) || b.iter().all(|&x| x < -margin)
+}
+
 /// The distinct real roots in `[low, high]` of the quartic `c[0] + c[1] x + … + c[4] x⁴`, in ascending order:
 /// as [`roots_between`], but with the split points from the closed form of the cubic.
 pub fn quartic_roots_between(c: &[f64; 5], low: f64, high: f64) -> RealRoots<5> {
@@ -452,6 +473,33 @@ mod tests {
         assert!((double[0] + 2.0).abs() < 1e-15);
         assert!(double[1..].iter().all(|x| (x - 1.0).abs() < 1e-7));
         assert!((depressed_cubic_roots(1e-20, 5e-30)[0] + 5e-10).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_polynomial_that_keeps_its_sign_has_no_root_in_the_unit_interval() {
+        fn check<const N: usize>(seed: u64) -> [u32; 2] {
+            let mut state = seed;
+            let mut counts = [0; 2];
+            for _ in 0..4000 {
+                let mut c: [f64; N] = std::array::from_fn(|_| 2.0 * uniform(&mut state) - 1.0);
+                c[0] *= 4.0;
+                let count = roots_between(&c, 0.0, 1.0).len();
+                if keeps_sign(&c) {
+                    assert_eq!(count, 0, "{c:?}");
+                    counts[0] += 1;
+                } else if count == 0 {
+                    counts[1] += 1;
+                }
+            }
+            counts
+        }
+        for [kept, missed] in [check::<4>(5), check::<7>(6)] {
+            assert!(kept > 1500 && missed < kept / 5, "{kept} {missed}");
+        }
+        // x - 0, 1 - x and x² - x touch zero at an end.
+        for c in [[0.0, 1.0, 0.0], [1.0, -1.0, 0.0], [0.0, -1.0, 1.0], [f64::NAN, 1.0, 1.0]] {
+            assert!(!keeps_sign(&c), "{c:?}");
+        }
     }
 
     #[test]
