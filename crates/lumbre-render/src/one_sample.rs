@@ -136,7 +136,7 @@ impl<'a> PixelSampler<'a> {
                 }
             }
         }
-        primary_hits.search(record);
+        self.search(&mut primary_hits, record);
         let seen = self.see(&mut primary_hits, record);
         for (slot, ((&id, &(weight, passes)), &radiance)) in
             ids.iter().zip(&weights).zip(primary_hits.radiance()).enumerate()
@@ -174,6 +174,19 @@ impl<'a> PixelSampler<'a> {
         let (FilmKind::Spectral(_), Some(wavelengths)) = (self.film, wavelengths) else { return None };
         let radiance = caught.map_or(radiance, |caught| wavelengths.varied_light(caught.radiance));
         Some(SpectralSample { nm: wavelengths.nm(), radiance: through_lens(radiance, passes).to_array() })
+    }
+
+    /// Finds the first hits of camera rays, if anybody looks at them.
+    fn search(&self, primary_hits: &mut PrimaryHits<'_, 'a>, record: &mut Record) {
+        record.counts.camera += primary_hits.len() as u64;
+        let is_looked_at = self.integrator.uses_primary_hits()
+            || self.wants_features
+            || !self.lights_are_seen
+            || matches!(self.film, FilmKind::GBuffer(_))
+            || self.scene.ground().is_some_and(|ground| ground.catcher);
+        if is_looked_at {
+            primary_hits.search();
+        }
     }
 
     /// Computes features and shadow catchers, then calls the integrator for the other samples. The result is empty if
@@ -304,7 +317,7 @@ impl<'a> PixelSampler<'a> {
         let (mut wave, mut record) = (Wave::default(), Record::with_journal());
         let mut primary_hits = self.start(&mut wave, &[id]);
         primary_hits.set_ray(0, camera);
-        primary_hits.search(&mut record);
+        self.search(&mut primary_hits, &mut record);
         let ray = primary_hits.ray(0);
         let seen = self.see(&mut primary_hits, &mut record).first().and_then(|seen| seen.caught);
         let radiance = seen.map_or(primary_hits.radiance()[0], |seen| seen.radiance);

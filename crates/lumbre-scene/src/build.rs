@@ -102,6 +102,7 @@ impl Scene {
         let has_solids = entries.iter().any(SurfaceEntry::may_be_solid);
         let has_one_sided = entries.iter().any(SurfaceEntry::is_one_sided_anywhere);
         let is_textured = entries.iter().any(SurfaceEntry::looks_up_anywhere);
+        let all_stop_pov_light = entries.iter().all(SurfaceEntry::stops_pov_light_everywhere);
         Ok(Self {
             accel,
             cameras,
@@ -120,6 +121,7 @@ impl Scene {
                 has_instances: !objects.is_empty(),
                 moves,
                 is_textured,
+                all_stop_pov_light,
             },
             specular_spheres: specular.spheres(&bounds),
             ground: ground.map(|desc| GroundPlane::new(desc, lighting.lights())),
@@ -513,6 +515,10 @@ impl Builder {
             shape: desc.index,
             is_textured: material.as_ref().is_some_and(|material| !material.is_uniform())
                 || desc.alpha.as_ref().is_some_and(|alpha| !alpha.is_constant()),
+            stops_pov_light: match material.as_ref().map(|material| &material.kind) {
+                Some(MaterialKind::Pov(material)) => desc.alpha.is_none() && material.stops_light(),
+                _ => false,
+            },
             material,
             material_id,
             emission: None,

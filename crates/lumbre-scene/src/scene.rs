@@ -1,12 +1,13 @@
 //! Scenes resolved for rendering, with the queries of light transport.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Curves, Ray, Surface};
 use lumbre_kernel::{Accel, Hit, Query};
 use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
-use lumbre_math::{DVec2, DVec3, Transform};
-use lumbre_shading::{FloatTexture, Spectrum};
+use lumbre_math::{DVec2, DVec3, Transform, Vec3};
+use lumbre_shading::{FloatTexture, Material, Spectrum};
 
 use crate::footprint::SurfaceFootprint;
 use crate::light::lanes::LaneLights;
@@ -52,6 +53,17 @@ pub struct Scene {
     pub(crate) traits: SceneTraits,
 }
 
+/// What a shadow ray meets by POV-Ray's rules.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PovObstacle {
+    /// No surface.
+    Nothing,
+    /// Only surfaces that may let light pass.
+    Clear,
+    /// A surface that stops all light.
+    Opaque,
+}
+
 /// What a scene has, so that rays can skip what it has not.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SceneTraits {
@@ -71,6 +83,8 @@ pub(crate) struct SceneTraits {
     pub(crate) moves: bool,
     /// Whether any material has textures, so that rays need footprints.
     pub(crate) is_textured: bool,
+    /// Whether all surfaces stop light by POV-Ray's rules.
+    pub(crate) all_stop_pov_light: bool,
 }
 
 impl BuildWarning {
@@ -343,6 +357,26 @@ impl Scene {
         }
     }
 
+    /// What a shadow ray meets by POV-Ray's rules. Cut-outs and interfaces count as clear.
+    pub fn pov_obstacle(&self, ray: &Ray) -> PovObstacle {
+        if self.traits.all_stop_pov_light {
+            return if self.accel.any(ray) { PovObstacle::Opaque } else { PovObstacle::Nothing };
+        }
+        let meets_clear = Cell::new(false);
+        let is_opaque = |hit: &Hit| {
+            let is_opaque = self.leaf(hit).entry.stops_pov_light;
+            meets_clear.set(meets_clear.get() || !is_opaque);
+            is_opaque
+        };
+        if self.accel.any_with(ray, &Query::new().filter(&is_opaque)) {
+            PovObstacle::Opaque
+        } else if meets_clear.get() {
+            PovObstacle::Clear
+        } else {
+            PovObstacle::Nothing
+        }
+    }
+
     /// The [`crate::ShapeDesc::index`] of the shape with an id in the tree.
     ///
     /// # Panics
@@ -392,6 +426,13 @@ impl Scene {
     /// [`Scene::interaction`] at a hit of [`Accel::closest_columns`]: picture rays that leave it do not hit it again.
     pub fn picture_interaction(&self, ray: &Ray, hit: &Hit, footprint: &Footprint) -> Interaction<'_> {
         self.interaction_at(ray, hit, footprint, self.accel.picture_surface(ray, hit))
+    }
+
+    /// The surface at a hit, its unit shading normal and its material.
+    pub(crate) fn pov_surface(&self, ray: &Ray, hit: &Hit) -> (Surface, Vec3, Option<&Material>) {
+        let leaf = self.leaf(hit);
+        let shaded = self.shading_geometry(&leaf, &self.accel.surface(ray, hit), ray, hit);
+        (shaded.surface, shaded.shading.normal, leaf.entry.material.as_deref())
     }
 
     fn interaction_at(

@@ -28,6 +28,8 @@ pub(crate) struct SurfaceEntry {
     pub reverse: bool,
     /// Whether the material has textures, and needs footprints.
     pub is_textured: bool,
+    /// Whether it stops all light by POV-Ray's rules: [`lumbre_shading::pov::PovMaterial::stops_light`].
+    pub stops_pov_light: bool,
     pub form: Form,
 }
 
@@ -274,6 +276,14 @@ impl SurfaceEntry {
         match &self.form {
             Form::Csg(csg) => csg.leaves.iter().any(Self::disperses),
             _ => self.material.as_ref().is_some_and(|material| material.has_dispersion()),
+        }
+    }
+
+    /// Whether all of it stops light by POV-Ray's rules.
+    pub(crate) fn stops_pov_light_everywhere(&self) -> bool {
+        match &self.form {
+            Form::Csg(csg) => csg.leaves.iter().all(Self::stops_pov_light_everywhere),
+            _ => self.stops_pov_light,
         }
     }
 

@@ -9,9 +9,6 @@ use lumbre_math::roots::roots_between;
 /// The highest degree.
 pub(super) const MAX_DEGREE: u32 = 15;
 
-/// A polynomial of one variable by its powers.
-type Powers = [f64; MAX_DEGREE as usize + 1];
-
 /// Where a polynomial is not above 0.
 #[derive(Clone, Debug)]
 pub(super) struct Algebraic {
@@ -21,7 +18,7 @@ pub(super) struct Algebraic {
 }
 
 /// A polynomial times o + d t, plus another.
-fn grown(c: &mut Powers, [o, d]: [f64; 2], plus: &Powers) {
+fn grown<const N: usize>(c: &mut [f64; N], [o, d]: [f64; 2], plus: &[f64; N]) {
     let mut lower = 0.0;
     for (c, plus) in c.iter_mut().zip(plus) {
         let own = *c;
@@ -36,10 +33,10 @@ impl Algebraic {
         Self { degree, terms }
     }
 
-    /// The polynomial along a line, by Horner's rule.
-    fn along(&self, o: DVec3, d: DVec3) -> Powers {
+    /// The first powers of the polynomial along a line, by Horner's rule.
+    fn along<const N: usize>(&self, o: DVec3, d: DVec3) -> [f64; N] {
         let constant = |x: f64| {
-            let mut c: Powers = [0.0; MAX_DEGREE as usize + 1];
+            let mut c = [0.0; N];
             c[0] = x;
             c
         };
@@ -60,31 +57,33 @@ impl Algebraic {
     }
 
     pub(super) fn contains(&self, p: DVec3) -> bool {
-        self.along(p, DVec3::ZERO)[0] <= 0.0
+        self.along::<1>(p, DVec3::ZERO)[0] <= 0.0
     }
 
     /// The gradient.
     pub(super) fn normal(&self, p: DVec3) -> DVec3 {
-        let slope = |axis: DVec3| self.along(p, axis)[1];
+        let slope = |axis: DVec3| self.along::<2>(p, axis)[1];
         DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z))
     }
 
     pub(super) fn roots(&self, ray: &Ray, out: &mut Roots) {
+        match self.degree {
+            2 => self.push_roots::<3>(ray, out),
+            3 => self.push_roots::<4>(ray, out),
+            4 => self.push_roots::<5>(ray, out),
+            5..=7 => self.push_roots::<8>(ray, out),
+            _ => self.push_roots::<{ MAX_DEGREE as usize + 1 }>(ray, out),
+        }
+    }
+
+    /// The roots, for a degree below `N`.
+    fn push_roots<const N: usize>(&self, ray: &Ray, out: &mut Roots) {
         // From the nearest point to the origin, where the coefficients are least.
         let dd = ray.direction.length_squared();
         let shift = -ray.origin.dot(ray.direction) / dd;
-        let c = self.along(ray.at(shift), ray.direction);
-        let (low, high) = (ray.t_min - shift, ray.t_max - shift);
-        let mut push = |roots: &[f64]| {
-            out.extend(roots.iter().map(|s| shift + s).filter(|t| ray.contains(*t)).map(Root::at));
-        };
-        match self.degree {
-            2 => push(&roots_between(&[c[0], c[1], c[2]], low, high)),
-            3 => push(&roots_between(&[c[0], c[1], c[2], c[3]], low, high)),
-            4 => push(&roots_between(&[c[0], c[1], c[2], c[3], c[4]], low, high)),
-            5..=7 => push(&roots_between(&[c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]], low, high)),
-            _ => push(&roots_between(&c, low, high)),
-        }
+        let c = self.along::<N>(ray.at(shift), ray.direction);
+        let roots = roots_between(&c, ray.t_min - shift, ray.t_max - shift);
+        out.extend(roots.iter().map(|s| shift + s).filter(|t| ray.contains(*t)).map(Root::at));
     }
 }
 

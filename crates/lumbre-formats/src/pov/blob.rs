@@ -4,11 +4,14 @@ use lumbre_geometry::{Aabb, Ray, Root, Roots};
 use lumbre_math::roots::quartic_roots_between;
 use lumbre_math::{DVec3, Transform};
 
+use super::part_tree::PartTree;
+
 /// Where the sum of the fields of all parts is above a threshold.
 #[derive(Clone, Debug)]
 pub(super) struct Blob {
     threshold: f64,
     parts: Vec<Ball>,
+    tree: PartTree,
     bounds: Aabb,
 }
 
@@ -137,39 +140,50 @@ struct Span {
 
 impl Blob {
     pub(super) fn new(threshold: f64, parts: Vec<Ball>) -> Self {
-        let all = parts.iter().map(Ball::bounds);
-        let bounds = all
-            .reduce(|a, b| Aabb { min: a.min.min(b.min), max: a.max.max(b.max) })
-            .unwrap_or(Aabb { min: DVec3::ZERO, max: DVec3::ONE });
-        Self { threshold, parts, bounds }
+        let all: Vec<Aabb> = parts.iter().map(Ball::bounds).collect();
+        let bounds =
+            all.iter().copied().reduce(Aabb::union).unwrap_or(Aabb { min: DVec3::ZERO, max: DVec3::ONE });
+        Self { threshold, tree: PartTree::new(&all), parts, bounds }
     }
 
     pub(super) fn bounds(&self) -> Aabb {
         self.bounds
     }
 
+    /// The parts that may have a field at a point.
+    fn around(&self, p: DVec3) -> impl Iterator<Item = &Ball> {
+        self.tree.around(p).into_iter().map(|part| &self.parts[part as usize])
+    }
+
     pub(super) fn contains(&self, p: DVec3) -> bool {
-        self.parts.iter().map(|part| part.field(p)).sum::<f64>() >= self.threshold
+        self.around(p).map(|part| part.field(p)).sum::<f64>() >= self.threshold
     }
 
     pub(super) fn normal(&self, p: DVec3) -> DVec3 {
-        -self.parts.iter().map(|part| part.gradient(p)).sum::<DVec3>()
+        -self.around(p).map(|part| part.gradient(p)).sum::<DVec3>()
     }
 
     pub(super) fn roots(&self, ray: &Ray, out: &mut Roots) {
+        let met = self.tree.along(ray);
+        if met.is_empty() {
+            return;
+        }
         // From the middle of the blob, where numbers are small.
         let middle = 0.5 * (self.bounds.min + self.bounds.max);
         let shift = (middle - ray.origin).dot(ray.direction) / ray.direction.length_squared();
         let moved = Ray::new(ray.at(shift), ray.direction);
         let mut spans = Vec::new();
-        for part in &self.parts {
-            part.spans(&moved, &mut spans);
+        for part in met {
+            self.parts[part as usize].spans(&moved, &mut spans);
         }
         let mut ends: Vec<f64> = spans.iter().flat_map(|span| [span.near, span.far]).collect();
-        ends.sort_by(f64::total_cmp);
+        ends.sort_unstable_by(f64::total_cmp);
         ends.dedup();
         for pair in ends.windows(2) {
             let (low, high) = (pair[0], pair[1]);
+            if high + shift < ray.t_min || low + shift > ray.t_max {
+                continue;
+            }
             let mut sum = [-self.threshold, 0.0, 0.0, 0.0, 0.0];
             for span in spans.iter().filter(|span| span.near <= low && high <= span.far) {
                 sum.iter_mut().zip(span.field).for_each(|(sum, field)| *sum += field);

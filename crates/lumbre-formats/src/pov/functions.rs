@@ -29,7 +29,47 @@ impl Draft {
     fn number(&mut self, x: f64) -> Register {
         self.push(Operation::Number(x))
     }
+
+    /// Puts the operations of another function here, for some arguments, which is faster than to call it; `None` for
+    /// one that is too long, or that has sums over its arguments.
+    fn inline(&mut self, code: &Code, arguments: &[Register]) -> Option<Register> {
+        let has_repeats =
+            code.operations.iter().any(|operation| matches!(operation, Operation::Repeat { .. }));
+        if has_repeats || self.operations.len() + code.operations.len() > MOST_INLINE {
+            return None;
+        }
+        let mut registers: Vec<Register> = Vec::with_capacity(code.operations.len());
+        for operation in &code.operations {
+            let at = |register: &Register| registers[*register as usize];
+            let all = |list: &[Register]| -> Box<[Register]> { list.iter().map(at).collect() };
+            let own = match operation {
+                Operation::Number(x) => Operation::Number(*x),
+                Operation::Argument(i) => match arguments.get(*i) {
+                    Some(&argument) => {
+                        registers.push(argument);
+                        continue;
+                    }
+                    None => Operation::Number(0.0),
+                },
+                Operation::Unary(of, x) => Operation::Unary(*of, at(x)),
+                Operation::Binary(of, a, b) => Operation::Binary(*of, at(a), at(b)),
+                Operation::Select(list) => Operation::Select(list.each_ref().map(at)),
+                Operation::Call { function, arguments, component } => Operation::Call {
+                    function: Arc::clone(function),
+                    arguments: all(arguments),
+                    component: *component,
+                },
+                Operation::Native(index, arguments) => Operation::Native(*index, all(arguments)),
+                Operation::Repeat { .. } => return None,
+            };
+            registers.push(self.push(own));
+        }
+        registers.last().copied()
+    }
 }
+
+/// No more operations are put in place of a call.
+const MOST_INLINE: usize = 64;
 
 impl Parser<'_, '_> {
     /// `function { … }` or `function(a, b) { … }`, whose word was taken.
@@ -369,17 +409,23 @@ impl Parser<'_, '_> {
 
     fn f_call(&mut self, draft: &mut Draft, function: Arc<Function>) -> Result<Register> {
         let arguments = self.f_list(draft)?;
-        if let Function::Code(Code { operations, .. }) = &*function
+        let is_native = matches!(&*function, Function::Code(code) if code.parameters == NATIVE_PARAMETERS);
+        if is_native
+            && let Function::Code(Code { operations, .. }) = &*function
             && let [.., Operation::Native(index, _)] = operations[..]
             && !natives::is_known(index)
         {
             let name = natives::NAMES.get(index as usize).copied().unwrap_or("internal");
             self.warn(&format!("the function f_{name} is not computed: it counts as 0"));
         }
-        let is_native = matches!(&*function, Function::Code(code) if code.parameters == NATIVE_PARAMETERS);
         if !is_native && arguments.len() != function.parameters() {
             let wrong = Diagnostic::error("a function is called with a wrong number of arguments");
             return Err(self.diagnostic(wrong.found(arguments.len()).expected(function.parameters())).into());
+        }
+        if let Function::Code(code) = &*function
+            && let Some(result) = draft.inline(code, &arguments)
+        {
+            return Ok(result);
         }
         let mut component = 0;
         let mut is_gray = false;

@@ -110,14 +110,25 @@ impl Iso {
     }
 
     pub(super) fn roots(&self, ray: &Ray, out: &mut Roots) {
+        self.each_root(ray, &mut |root| {
+            out.push(root);
+            true
+        });
+    }
+
+    /// Visits roots from the nearest on, while that returns true: what lies behind is not looked for.
+    pub(super) fn each_root(&self, ray: &Ray, visit: &mut dyn FnMut(Root) -> bool) {
         let Some([near, far]) = self.container.range(ray) else { return };
         // The sides of the container that are inside of the surface.
-        let on_container = |t: f64, out: &mut Roots| {
-            if !self.open && ray.contains(t) && self.value(ray.at(t)) < 0.0 {
-                out.push(Root { part: ON_CONTAINER, ..Root::at(t) });
-            }
+        let on_container = |t: f64| {
+            let is_root = !self.open && ray.contains(t) && self.value(ray.at(t)) < 0.0;
+            is_root.then(|| Root { part: ON_CONTAINER, ..Root::at(t) })
         };
-        on_container(near, out);
+        if let Some(root) = on_container(near)
+            && !visit(root)
+        {
+            return;
+        }
         let (low, high) = (near.max(ray.t_min), far.min(ray.t_max));
         if low < high {
             let length = ray.direction.length();
@@ -125,28 +136,30 @@ impl Iso {
             let least = self.accuracy / length;
             let at = |t: f64| self.value(ray.at(t));
             // Pieces, the nearest last.
-            let mut pieces = vec![(low, at(low), high, at(high))];
+            let mut pieces: Vec<[f64; 4]> = vec![[low, at(low), high, at(high)]];
             let mut evaluations = 0;
-            while let Some((a, fa, b, fb)) = pieces.pop() {
+            while let Some([a, fa, b, fb]) = pieces.pop() {
                 let changes = (fa < 0.0) != (fb < 0.0);
                 // No slower than this it can have been at zero between.
                 if !changes && fa.abs() + fb.abs() > slope * (b - a) {
                     continue;
                 }
                 if b - a < least || evaluations > MAX_EVALUATIONS {
-                    if changes {
-                        out.push(Root::at(refined(&at, a, b, fa < 0.0)));
+                    if changes && !visit(Root::at(refined(&at, a, b, fa < 0.0))) {
+                        return;
                     }
                     continue;
                 }
                 evaluations += 1;
                 let middle = 0.5 * (a + b);
                 let fm = at(middle);
-                pieces.push((middle, fm, b, fb));
-                pieces.push((a, fa, middle, fm));
+                pieces.push([middle, fm, b, fb]);
+                pieces.push([a, fa, middle, fm]);
             }
         }
-        on_container(far, out);
+        if let Some(root) = on_container(far) {
+            visit(root);
+        }
     }
 }
 

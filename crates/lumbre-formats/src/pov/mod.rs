@@ -26,6 +26,7 @@ mod mesh_tree;
 mod meshes;
 mod objects;
 mod palette;
+mod part_tree;
 mod patches;
 mod patterns;
 mod settings;

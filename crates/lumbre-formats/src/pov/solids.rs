@@ -191,6 +191,21 @@ impl Solid {
         }
     }
 
+    /// Visits roots from the nearest on, while that returns true.
+    fn each_root(&self, ray: &Ray, visit: &mut dyn FnMut(Root) -> bool) {
+        if let Self::Body { body: Body::Iso(iso), world_from_object } = self {
+            iso.each_root(&ray.into_object(world_from_object), visit);
+            return;
+        }
+        let mut roots = Roots::new();
+        self.roots(ray, &mut roots);
+        for root in roots {
+            if !visit(root) {
+                return;
+            }
+        }
+    }
+
     pub(super) fn surface(&self, ray: &Ray, root: &Root) -> Surface {
         match self {
             Self::Exact { surface, .. } => surface.surface(ray, root),
@@ -397,14 +412,10 @@ impl Clipped {
     }
 
     fn each(&self, ray: &Ray, mut visit: impl FnMut(Root) -> bool) {
-        let mut roots = Roots::new();
-        self.solid.roots(ray, &mut roots);
-        for root in roots {
+        self.solid.each_root(ray, &mut |root| {
             let p = ray.at(root.t);
-            if self.regions.iter().all(|region| region.contains(p)) && !visit(root) {
-                return;
-            }
-        }
+            !self.regions.iter().all(|region| region.contains(p)) || visit(root)
+        });
     }
 }
 

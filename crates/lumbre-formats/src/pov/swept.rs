@@ -1,7 +1,7 @@
 //! Solids made of plane curves: swept along y, drawn to a point, or turned about y.
 
 use lumbre_geometry::{Aabb, Ray, Root, Roots};
-use lumbre_math::roots::roots_between;
+use lumbre_math::roots::{keeps_sign, roots_between};
 use lumbre_math::{DVec2, DVec3, Elementary};
 
 /// A piece of a curve, a cubic in u from 0 to 1, whose second coordinate only rises or only falls.
@@ -281,6 +281,9 @@ fn prism_sides(outline: &Outline, heights: &[f64; 2], conic: bool, ray: &Ray, ou
     for (part, piece) in outline.pieces.iter().enumerate() {
         let mut c: [f64; 4] = std::array::from_fn(|i| line.x * piece.a[i] + line.z * piece.b[i]);
         c[0] += line.y;
+        if keeps_sign(&c) {
+            continue;
+        }
         for &u in roots_between(&c, 0.0, 1.0).iter().filter(|u| **u < 1.0) {
             let (x, z) = (at(&piece.a, u), at(&piece.b, u));
             let t = if conic {
@@ -340,6 +343,9 @@ fn lathe_sides(outline: &Outline, is_squared: bool, ray: &Ray, out: &mut Roots) 
             if is_squared {
                 c[i] -= piece.a[i] * d.y * d.y;
             }
+        }
+        if keeps_sign(&c) {
+            continue;
         }
         for &u in roots_between(&c, 0.0, 1.0).iter().filter(|u| **u < 1.0) {
             push((at(&piece.b, u) - o.y) / d.y, u);

@@ -24,6 +24,11 @@ pub trait Integrator: Debug + Send + Sync {
         false
     }
 
+    /// Whether it looks at the first hits of camera rays, which are then found for all of them at a time.
+    fn uses_primary_hits(&self) -> bool {
+        true
+    }
+
     /// Whether camera rays need footprints even in scenes without textures.
     fn needs_footprints(&self) -> bool {
         false

@@ -8,13 +8,14 @@ use std::f64::consts::FRAC_PI_2;
 use lumbre_geometry::Ray;
 use lumbre_math::{DVec2, DVec3, Elementary};
 use lumbre_scene::pov::{PovArea, PovLight, PovRadiosity, PovWorld};
-use lumbre_scene::{Footprint, Interaction, Light, Scene, View};
-use lumbre_shading::pov::{Eye, Finish, LayerAt, PovMaterial};
-use lumbre_shading::{MaterialKind, Spectrum};
-use smallvec::SmallVec;
+use lumbre_scene::{Light, PovHit, PovObstacle, Scene};
+use lumbre_shading::Spectrum;
+use lumbre_shading::pov::{Asked, Eye, Finish, LayerAt, PovMaterial};
+use smallvec::{SmallVec, smallvec};
 
-use crate::integrators::RayIntegrator;
-use crate::transport::{PrimaryHit, Record, SampleNumbers};
+use crate::integrators::Integrator;
+use crate::transport::{Record, Sampler};
+use crate::wave::PrimaryHits;
 
 /// The light of POV-Ray's scenes as POV-Ray computes it, after its reference manual. Colours are in the scene's working
 /// space until they are summed.
@@ -65,22 +66,28 @@ struct Tracer<'s> {
     lights: Vec<&'s PovLight>,
 }
 
-impl RayIntegrator for Pov {
-    fn radiance(
-        &self,
-        scene: &Scene,
-        _: &View,
-        primary_hit: PrimaryHit<'_>,
-        numbers: &SampleNumbers,
-        record: &mut Record,
-    ) -> Spectrum {
-        let Some(world) = scene.pov() else { return Spectrum::BLACK };
+impl Integrator for Pov {
+    fn estimate(&self, primary_hits: &mut PrimaryHits<'_, '_>, _: &Sampler, record: &mut Record) {
+        let scene = primary_hits.scene();
+        let Some(world) = scene.pov() else { return };
         let lights = scene.lights().iter().filter_map(|light| match light {
             Light::Pov(light) => Some(&**light),
             _ => None,
         });
         let tracer = Tracer { scene, world, lights: lights.collect() };
-        let ray = primary_hit.ray.ray;
+        primary_hits.each_ray(|ray, numbers| tracer.seen_by_camera(ray, numbers.light_point(0), record));
+    }
+
+    /// Its patterns need points in double precision, which it finds itself.
+    fn uses_primary_hits(&self) -> bool {
+        false
+    }
+}
+
+impl<'s> Tracer<'s> {
+    /// The linear light along a ray from the camera, with a shift of the directions that light is gathered from.
+    fn seen_by_camera(&self, ray: Ray, shift: DVec2, record: &mut Record) -> Spectrum {
+        let world = self.world;
         let is_at_eye = ray.origin.distance(world.eye) <= NEAR * (1.0 + world.eye.length());
         let first = Traced {
             inside: if is_at_eye {
@@ -95,28 +102,19 @@ impl RayIntegrator for Pov {
             is_mirrored: false,
             is_camera: true,
             gathers: 0,
-            shift: numbers.light_point(0),
+            shift,
         };
-        let colour = tracer.trace(&first, record);
+        let colour = self.trace(&first, record);
         if world.gamma == 1.0 { colour } else { colour.map(|c| c.max(0.0).power(world.gamma)) }
-    }
-}
-
-impl<'s> Tracer<'s> {
-    fn material(here: &Interaction<'s>) -> Option<&'s PovMaterial> {
-        match &here.material?.kind {
-            MaterialKind::Pov(material) => Some(material),
-            _ => None,
-        }
     }
 
     /// The first surface along a ray that is not hidden from it.
-    fn closest(&self, traced: &Traced<'s>) -> Option<(Interaction<'s>, &'s PovMaterial, f64)> {
+    fn closest(&self, traced: &Traced<'s>) -> Option<(PovHit<'s>, &'s PovMaterial, f64)> {
         let mut ray = traced.ray;
         for _ in 0..MAX_SURFACES {
             let hit = self.scene.closest(&ray)?;
-            let here = self.scene.interaction(&ray, &hit, &Footprint::Point);
-            let material = Self::material(&here)?;
+            let here = self.scene.pov_hit(&ray, &hit);
+            let material = here.material?;
             let visible = material.visibility;
             let is_hidden =
                 (visible.no_image && traced.is_camera) || (visible.no_reflection && traced.is_mirrored);
@@ -169,23 +167,19 @@ impl<'s> Tracer<'s> {
     fn shade(
         &self,
         traced: &Traced<'s>,
-        here: &Interaction<'s>,
+        here: &PovHit<'s>,
         material: &'s PovMaterial,
         left: Spectrum,
         record: &mut Record,
     ) -> Spectrum {
         let direction = traced.ray.direction.normalize();
-        let smooth = here.shading.normal.as_dvec3();
+        let smooth = here.smooth;
         let normal = if smooth.dot(direction) > 0.0 { -smooth } else { smooth };
-        let eye = Eye {
-            normal,
-            direction: -direction,
-            uv: material.surface_uv(here.surface.point, here.at.uv.as_dvec2()),
-        };
+        let eye = Eye { normal, direction: -direction, uv: material.surface_uv(here.surface.point, here.uv) };
         // A solid that the ray is in is left.
         let is_inside = traced.inside.iter().any(|solid| solid.is_of_solid(material));
         let mut sum = Spectrum::BLACK;
-        for (share, layers) in &material.stacks(here.surface.point, &eye, here.front) {
+        for (share, layers) in &material.stacks(here.surface.point, &eye, here.front, Asked::Normals) {
             sum += self.stack(traced, here, material, layers, left, is_inside, record) * *share;
         }
         sum
@@ -197,7 +191,7 @@ impl<'s> Tracer<'s> {
     fn stack(
         &self,
         traced: &Traced<'s>,
-        here: &Interaction<'s>,
+        here: &PovHit<'s>,
         material: &'s PovMaterial,
         layers: &[LayerAt<'_>],
         fade: Spectrum,
@@ -207,7 +201,7 @@ impl<'s> Tracer<'s> {
         let mut sum = Spectrum::BLACK;
         let mut left = Spectrum::WHITE;
         // What the lights give is the same for layers of the same normal.
-        let mut shadows: Vec<Option<Spectrum>> = vec![None; self.lights.len()];
+        let mut shadows: SmallVec<[Option<Spectrum>; 8]> = smallvec![None; self.lights.len()];
         let mut gathered = None;
         let has_ambient = self.world.radiosity.is_none_or(|radiosity| radiosity.has_ambient);
         for layer in layers.iter().rev() {
@@ -246,7 +240,7 @@ impl<'s> Tracer<'s> {
     fn gathered(
         &self,
         traced: &Traced<'s>,
-        here: &Interaction<'s>,
+        here: &PovHit<'s>,
         radiosity: &PovRadiosity,
         record: &mut Record,
     ) -> Spectrum {
@@ -258,7 +252,7 @@ impl<'s> Tracer<'s> {
             _ => GATHERED_FURTHER,
         };
         let d = traced.ray.direction;
-        let smooth = here.shading.normal.as_dvec3();
+        let smooth = here.smooth;
         let normal = if smooth.dot(d) > 0.0 { -smooth } else { smooth };
         let raw = if here.surface.normal.dot(d) > 0.0 { -here.surface.normal } else { here.surface.normal };
         let (side, up) = normal.any_orthonormal_pair();
@@ -300,7 +294,7 @@ impl<'s> Tracer<'s> {
     fn lit(
         &self,
         traced: &Traced<'s>,
-        here: &Interaction<'s>,
+        here: &PovHit<'s>,
         material: &PovMaterial,
         layer: &LayerAt<'_>,
         light: &PovLight,
@@ -349,7 +343,7 @@ impl<'s> Tracer<'s> {
     fn shaded(
         &self,
         traced: &Traced<'s>,
-        here: &Interaction<'s>,
+        here: &PovHit<'s>,
         material: &PovMaterial,
         layer: &LayerAt<'_>,
         light: &PovLight,
@@ -448,7 +442,7 @@ impl<'s> Tracer<'s> {
     fn mirror(
         &self,
         traced: &Traced<'s>,
-        here: &Interaction<'s>,
+        here: &PovHit<'s>,
         material: &'s PovMaterial,
         layer: &LayerAt<'_>,
         record: &mut Record,
@@ -491,7 +485,7 @@ impl<'s> Tracer<'s> {
     fn passing(
         &self,
         traced: &Traced<'s>,
-        here: &Interaction<'s>,
+        here: &PovHit<'s>,
         material: &'s PovMaterial,
         layer: &LayerAt<'_>,
         [left, fade]: [Spectrum; 2],
@@ -548,7 +542,7 @@ impl<'s> Tracer<'s> {
     }
 
     /// What comes through of a light, by its area.
-    fn shadows(&self, here: &Interaction<'s>, light: &PovLight, record: &mut Record) -> Spectrum {
+    fn shadows(&self, here: &PovHit<'s>, light: &PovLight, record: &mut Record) -> Spectrum {
         match &light.area {
             Some(area) if area.counts != [1, 1] => self.mean_of_area(area, record, &mut |u, record| {
                 self.shadow(here, light, light.place(u, here.surface.point), record)
@@ -565,7 +559,7 @@ impl<'s> Tracer<'s> {
         at: &mut dyn FnMut(DVec2, &mut Record) -> Spectrum,
     ) -> Spectrum {
         let [n, m] = area.counts;
-        let mut known: Vec<Option<Spectrum>> = vec![None; (n * m) as usize];
+        let mut known: SmallVec<[Option<Spectrum>; 64]> = smallvec![None; (n * m) as usize];
         let mut corner = |u: u32, v: u32| {
             *known[(u * m + v) as usize].get_or_insert_with(|| at(DVec2::new(step(u, n), step(v, m)), record))
         };
@@ -573,7 +567,7 @@ impl<'s> Tracer<'s> {
     }
 
     /// What comes through to a point of a surface from a place of a light.
-    fn shadow(&self, here: &Interaction<'s>, light: &PovLight, from: DVec3, record: &mut Record) -> Spectrum {
+    fn shadow(&self, here: &PovHit<'s>, light: &PovLight, from: DVec3, record: &mut Record) -> Spectrum {
         let p = here.surface.point;
         let Some((towards, distance)) = light.towards(p, from) else { return Spectrum::WHITE };
         self.between(here.leave(towards), p + towards * distance, Inside::new(), light, record)
@@ -590,6 +584,12 @@ impl<'s> Tracer<'s> {
     ) -> Spectrum {
         record.counts.shadow += 1;
         let towards = ray.direction;
+        let rest = (target - ray.origin).dot(towards);
+        match self.scene.pov_obstacle(&ray.with_range(NEAR, rest - NEAR)) {
+            PovObstacle::Opaque => return Spectrum::BLACK,
+            PovObstacle::Nothing => return self.media_passing(&inside, &ray, rest, light),
+            PovObstacle::Clear => {}
+        }
         let mut left = Spectrum::WHITE;
         let mut travelled = 0.0;
         for _ in 0..MAX_SURFACES {
@@ -597,24 +597,25 @@ impl<'s> Tracer<'s> {
             let Some(hit) = self.scene.closest(&ray.with_range(0.0, rest - NEAR)) else {
                 return left * self.media_passing(&inside, &ray, rest, light);
             };
-            let there = self.scene.interaction(&ray, &hit, &Footprint::Point);
-            let Some(material) = Self::material(&there) else { return left };
+            let there = self.scene.pov_hit(&ray, &hit);
+            let Some(material) = there.material else { return left };
             let step = (there.surface.point - ray.origin).length();
             let is_near = travelled + step < NEAR;
             travelled += step;
             left *= self.media_passing(&inside, &ray, step, light);
             if !material.visibility.no_shadow && !is_near {
-                let smooth = there.shading.normal.as_dvec3();
+                let smooth = there.smooth;
                 let normal = if smooth.dot(towards) > 0.0 { -smooth } else { smooth };
                 let eye = Eye {
                     normal,
                     direction: -towards,
-                    uv: material.surface_uv(there.surface.point, there.at.uv.as_dvec2()),
+                    uv: material.surface_uv(there.surface.point, there.uv),
                 };
                 // A ray that begins at a surface may begin inside of a solid.
                 let is_inside = !there.front || inside.iter().any(|solid| solid.is_of_solid(material));
                 let mut passes = Spectrum::BLACK;
-                for (share, layers) in &material.stacks(there.surface.point, &eye, there.front) {
+                let asked = if material.interior.caustics == 0.0 { Asked::Colours } else { Asked::Normals };
+                for (share, layers) in &material.stacks(there.surface.point, &eye, there.front, asked) {
                     let mut stack = layers
                         .iter()
                         .fold(Spectrum::splat(*share), |left, layer| left * layer.colour.passing());

@@ -98,9 +98,8 @@ impl<'a, 's> PrimaryHits<'a, 's> {
     }
 
     /// Finds the first hits of all rays.
-    pub(crate) fn search(&mut self, record: &mut Record) {
+    pub(crate) fn search(&mut self) {
         let Wave { hits, slots, paths, .. } = &mut *self.wave;
-        record.counts.camera += paths.len as u64;
         hits.search(self.scene, paths, slots, self.precision, true);
     }
 
@@ -209,6 +208,14 @@ impl<'a, 's> PrimaryHits<'a, 's> {
             let slot = self.wanted[at] as usize;
             let found = radiance(self.primary_hit(slot), &self.numbers(slot));
             self.wave.slots.radiance[slot] = found;
+        }
+    }
+
+    /// Sets the radiance of each sample by a function of its ray alone, whose first hit nobody has found.
+    pub(crate) fn each_ray(&mut self, mut radiance: impl FnMut(Ray, &SampleNumbers) -> Spectrum) {
+        for at in 0..self.wanted.len() {
+            let slot = self.wanted[at] as usize;
+            self.wave.slots.radiance[slot] = radiance(self.ray(slot), &self.numbers(slot));
         }
     }
 

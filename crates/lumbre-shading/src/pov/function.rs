@@ -308,19 +308,43 @@ impl Code {
 
     /// Its value.
     pub fn value(&self, arguments: &[f64]) -> f64 {
-        let mut registers: SmallVec<[f64; 48]> = SmallVec::with_capacity(self.operations.len());
-        for operation in &self.operations {
-            let value = operation.value(arguments, &registers);
-            registers.push(value);
+        match self.operations.len() {
+            ..=FEW => self.run(arguments, &mut [0.0; FEW]),
+            ..=MANY => self.run(arguments, &mut [0.0; MANY]),
+            count => self.run(arguments, &mut vec![0.0; count]),
         }
-        registers.last().copied().unwrap_or(0.0)
     }
+
+    /// Its value, with at least as many registers as operations.
+    fn run(&self, arguments: &[f64], registers: &mut [f64]) -> f64 {
+        let mut last = 0.0;
+        for (i, operation) in self.operations.iter().enumerate() {
+            last = operation.value(arguments, registers);
+            registers[i] = last;
+        }
+        last
+    }
+}
+
+/// How many registers are kept without an allocation.
+const FEW: usize = 16;
+const MANY: usize = 64;
+
+/// Calls a function with a list of registers.
+fn with_all<R>(list: &[Register], registers: &[f64], call: impl FnOnce(&[f64]) -> R) -> R {
+    let mut few = [0.0; FEW];
+    if list.len() > FEW {
+        return call(&list.iter().map(|&r| registers[r as usize]).collect::<Vec<f64>>());
+    }
+    for (place, &r) in few.iter_mut().zip(list) {
+        *place = registers[r as usize];
+    }
+    call(&few[..list.len()])
 }
 
 impl Operation {
     fn value(&self, arguments: &[f64], registers: &[f64]) -> f64 {
         let at = |register: Register| registers[register as usize];
-        let all = |list: &[Register]| list.iter().map(|&r| at(r)).collect::<SmallVec<[f64; 12]>>();
         match self {
             Self::Number(value) => *value,
             Self::Argument(i) => arguments.get(*i).copied().unwrap_or(0.0),
@@ -337,13 +361,14 @@ impl Operation {
                 }
             }
             Self::Call { function, arguments, component } => {
-                let arguments = all(arguments);
-                match (&**function, component) {
-                    (Function::Code(code), 0) => code.value(&arguments),
-                    _ => function.call(&arguments)[*component],
-                }
+                with_all(arguments, registers, |arguments| match (&**function, component) {
+                    (Function::Code(code), 0) => code.value(arguments),
+                    _ => function.call(arguments)[*component],
+                })
             }
-            Self::Native(index, arguments) => natives::value(*index, &all(arguments)),
+            Self::Native(index, arguments) => {
+                with_all(arguments, registers, |arguments| natives::value(*index, arguments))
+            }
             Self::Repeat { is_product, from, to, body } => {
                 let (from, to) = (at(*from), at(*to));
                 let mut inner: SmallVec<[f64; 12]> = arguments.iter().copied().collect();

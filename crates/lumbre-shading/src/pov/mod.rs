@@ -28,7 +28,9 @@ pub use normal::{Normal, NormalKind};
 pub use pattern::{Crackle, InsideTest, Pattern, PatternKind, Slope, Wave};
 pub use pigment::{Colour, ColourMap, ImageMap, ImageProjection, ImageSource, Pigment, PigmentKind};
 pub use spline::{Spline, SplineKind};
-pub use texture::{Interior, Layer, LayerAt, PovMaterial, Stacks, Texture, TextureKind, UvForm, Visibility};
+pub use texture::{
+    Asked, Interior, Layer, LayerAt, PovMaterial, Stacks, Texture, TextureKind, UvForm, Visibility,
+};
 pub use warp::{BlackHole, Unrolling, Warp, Warps};
 
 use lumbre_math::{DVec2, DVec3};

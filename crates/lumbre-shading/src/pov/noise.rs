@@ -32,8 +32,9 @@ fn draw(state: &mut i32) -> i32 {
 }
 
 struct Tables {
-    hash: Vec<u16>,
-    lattice: Vec<f64>,
+    /// All whole numbers below 4096 in another order, twice.
+    hash: Box<[u16; 8192]>,
+    lattice: Box<[f64; LATTICE]>,
     random: Vec<f64>,
     permutation: Vec<u16>,
     gradients: Vec<DVec3>,
@@ -64,15 +65,17 @@ impl Tables {
 /// Waves come from at most this many sources.
 const MAX_WAVES: usize = 256;
 
-fn hash_table() -> Vec<u16> {
+/// The numbers of 267 places of the lattice, each with half of it.
+const LATTICE: usize = 534;
+
+fn hash_table() -> Box<[u16; 8192]> {
     let mut hash: Vec<u16> = (0..4096).collect();
     let mut state = 0_i32;
     for i in (0..4096).rev() {
         let j = draw(&mut state) as usize % 4096;
         hash.swap(i, j);
     }
-    hash.extend_from_within(..);
-    hash
+    Box::new(std::array::from_fn(|i| hash[i & 4095]))
 }
 
 /// The CRC-16 with the reflected polynomial 0xA001.
@@ -82,13 +85,13 @@ fn crc16(bytes: impl Iterator<Item = u8>) -> u16 {
     })
 }
 
-fn lattice_table() -> Vec<f64> {
-    let mut lattice = Vec::with_capacity(534);
-    for i in 0..267 {
-        let place = (f64::from(i) * 0.12345).to_be_bytes();
+fn lattice_table() -> Box<[f64; LATTICE]> {
+    let mut lattice = Box::new([0.0; LATTICE]);
+    for (i, pair) in lattice.chunks_exact_mut(2).enumerate() {
+        let place = (i as f64 * 0.12345).to_be_bytes();
         let n = f64::from(crc16(place.iter().chain(&place).chain(&place).copied()));
         let value = six_digits(n * 2.0 / 65_535.0 - 1.0);
-        lattice.extend([value, 0.5 * value]);
+        pair.copy_from_slice(&[value, 0.5 * value]);
     }
     lattice
 }
@@ -155,15 +158,17 @@ fn perlin_tables() -> (Vec<u16>, Vec<DVec3>) {
     (permutation, gradients)
 }
 
+/// A number below 4096 by two.
+#[inline]
 fn hash2(tables: &Tables, a: usize, b: usize) -> usize {
-    usize::from(tables.hash[usize::from(tables.hash[a & 4095]) ^ (b & 4095)])
+    usize::from(tables.hash[(usize::from(tables.hash[a & 4095]) ^ (b & 4095)) & 8191])
 }
 
 /// The hash of a cell by its whole coordinates.
 pub(super) fn hash3(a: i64, b: i64, c: i64) -> usize {
     let tables = &*TABLES;
     let [a, b, c] = [a, b, c].map(|x| (x & 4095) as usize);
-    usize::from(tables.hash[hash2(tables, a, b) ^ c])
+    usize::from(tables.hash[(hash2(tables, a, b) ^ c) & 8191])
 }
 
 /// A random number in [0, 1) by a hash.
@@ -188,21 +193,23 @@ impl Cell {
     }
 
     /// The lattice sums with these offsets into the table.
+    #[inline]
     fn sums<const N: usize>(&self, offsets: [usize; N]) -> [f64; N] {
         let tables = &*TABLES;
         let f = self.place;
         let s = f * f * (DVec3::splat(3.0) - 2.0 * f);
+        let [ix, iy, iz] = self.corner;
+        let rows: [usize; 4] = std::array::from_fn(|i| hash2(tables, ix + (i & 1), iy + (i >> 1)));
+        let (near, away) = (DVec3::ONE - s, f - DVec3::ONE);
         let mut sums = [0.0; N];
         for corner in 0..8 {
             let [dx, dy, dz] = [corner & 1, corner >> 1 & 1, corner >> 2];
-            let [ix, iy, iz] = self.corner;
-            let row = hash2(tables, ix + dx, iy + dy);
-            let m = 2 * usize::from(tables.hash[row ^ ((iz + dz) & 4095)] & 255);
-            let d = f - DVec3::new(dx as f64, dy as f64, dz as f64);
-            let share = |is_far: usize, s: f64| if is_far == 1 { s } else { 1.0 - s };
-            let weight = share(dx, s.x) * share(dy, s.y) * share(dz, s.z);
+            let m = 2 * usize::from(tables.hash[(rows[corner & 3] ^ ((iz + dz) & 4095)) & 8191] & 255);
+            let pick = |is_far: usize, far: f64, near: f64| if is_far == 1 { far } else { near };
+            let d = DVec3::new(pick(dx, away.x, f.x), pick(dy, away.y, f.y), pick(dz, away.z, f.z));
+            let weight = pick(dx, s.x, near.x) * pick(dy, s.y, near.y) * pick(dz, s.z, near.z);
             for (sum, offset) in sums.iter_mut().zip(offsets) {
-                let l = &tables.lattice[m + offset..];
+                let l: &[f64; 7] = tables.lattice[m + offset..].first_chunk().unwrap_or(&[0.0; 7]);
                 *sum += weight * (l[1] + l[2] * d.x + l[4] * d.y + l[6] * d.z);
             }
         }

@@ -248,6 +248,15 @@ impl Pattern {
         }
     }
 
+    /// Whether its values depend on the normal of a surface.
+    pub(super) fn looks_at_normals(&self) -> bool {
+        match &self.kind {
+            PatternKind::Slope(_) | PatternKind::AngleOfIncidence => true,
+            PatternKind::Pigment(pigment) => pigment.looks_at_normals(),
+            _ => false,
+        }
+    }
+
     /// The value at a point of the pattern ([`Pattern::point`]), after its wave.
     pub fn value(&self, p: DVec3, eye: &Eye) -> f64 {
         let mut v = self.raw(p, eye);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lumbre_math::{DVec3, Elementary, Vec3};
 use smallvec::SmallVec;
 
-use super::texture::{LayerAt, PovMaterial, Stacks, Texture, TextureKind};
+use super::texture::{Asked, LayerAt, PovMaterial, Stacks, Texture, TextureKind};
 use super::{Eye, Pigment, PigmentKind, Reflection};
 use crate::material::albedo;
 use crate::microfacet::Microfacets;
@@ -17,9 +17,9 @@ const MIRROR_ETA: f32 = 1e6;
 
 impl PovMaterial {
     /// What the surface looks like at a place, towards a viewer on the side of the normal: the stacks of its texture.
-    pub fn stacks(&self, p: DVec3, eye: &Eye, front: bool) -> Stacks<'_> {
+    pub fn stacks(&self, p: DVec3, eye: &Eye, front: bool, asked: Asked) -> Stacks<'_> {
         let mut stacks = Stacks::new();
-        self.side(front).stacks(p, eye, 1.0, &mut stacks);
+        self.side(front).stacks(p, eye, 1.0, asked, &mut stacks);
         stacks
     }
 
@@ -31,7 +31,7 @@ impl PovMaterial {
     /// The unit normal that the top layer of most weight tilts a unit normal to.
     pub(crate) fn tilted(&self, at: &TextureContext, normal: Vec3) -> Vec3 {
         let eye = self.eye(at, normal);
-        let stacks = self.stacks(at.point, &eye, true);
+        let stacks = self.stacks(at.point, &eye, true, Asked::Normals);
         let most = stacks.iter().max_by(|a, b| a.0.total_cmp(&b.0));
         most.and_then(|(_, layers)| layers.last()).map_or(normal, |layer| layer.normal.as_vec3())
     }
@@ -41,7 +41,7 @@ impl PovMaterial {
     pub(crate) fn bsdf(&self, at: &TextureContext) -> Uber {
         let eye = self.eye(at, at.normal);
         let mut sum = Lobes::default();
-        for (share, layers) in &self.stacks(at.point, &eye, true) {
+        for (share, layers) in &self.stacks(at.point, &eye, true, Asked::Normals) {
             sum.add(self, *share, layers);
         }
         let passes = !sum.passed.is_black();
@@ -61,6 +61,13 @@ impl PovMaterial {
             eta,
             facets: Microfacets::new(alpha, alpha),
         }
+    }
+
+    /// Whether it stops all light that would pass to the other side, wherever that meets it; false when in doubt.
+    pub fn stops_light(&self) -> bool {
+        !self.visibility.no_shadow
+            && !may_pass(&self.texture)
+            && !self.interior_texture.as_ref().is_some_and(|texture| may_pass(texture))
     }
 
     /// Whether light may pass to the other side.
@@ -103,7 +110,8 @@ fn may_pass(texture: &Texture) -> bool {
 
 fn pigment_may_pass(pigment: &Pigment) -> bool {
     match &pigment.kind {
-        PigmentKind::Colour(colour) => !colour.passing().is_black(),
+        // A filter that is black passes light where it is blended with another colour.
+        PigmentKind::Colour(colour) => colour.is_clear(),
         PigmentKind::Map(_, map) => map.may_pass(),
         PigmentKind::Pigments(_, map) => map.iter().any(|(_, pigment)| pigment_may_pass(pigment)),
         PigmentKind::Blocks(_, pigments) => {

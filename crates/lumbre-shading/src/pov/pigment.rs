@@ -58,6 +58,11 @@ impl Colour {
         1.0 - (filtered + self.transmit)
     }
 
+    /// Whether it filters or transmits light.
+    pub(super) fn is_clear(self) -> bool {
+        self.filter != 0.0 || self.transmit != 0.0
+    }
+
     /// What light that passes is multiplied by.
     pub fn passing(self) -> Spectrum {
         self.rgb * self.filter + Spectrum::splat(self.transmit)
@@ -103,6 +108,21 @@ impl Pigment {
         match self.kind {
             PigmentKind::Colour(colour) => Some(colour),
             _ => None,
+        }
+    }
+
+    /// Whether its colours depend on the normal of a surface.
+    pub(super) fn looks_at_normals(&self) -> bool {
+        match &self.kind {
+            PigmentKind::Colour(_) | PigmentKind::Image(_) => false,
+            PigmentKind::Map(pattern, _) => pattern.looks_at_normals(),
+            PigmentKind::Pigments(pattern, map) => {
+                pattern.looks_at_normals() || map.iter().any(|(_, pigment)| pigment.looks_at_normals())
+            }
+            PigmentKind::Blocks(pattern, pigments) => {
+                pattern.looks_at_normals() || pigments.iter().any(|pigment| pigment.looks_at_normals())
+            }
+            PigmentKind::Average(pigments) => pigments.iter().any(|(_, pigment)| pigment.looks_at_normals()),
         }
     }
 
@@ -179,7 +199,7 @@ impl ColourMap {
 
     /// Whether any of its colours lets light pass.
     pub(super) fn may_pass(&self) -> bool {
-        self.entries.iter().any(|(_, colour)| !colour.passing().is_black())
+        self.entries.iter().any(|(_, colour)| colour.is_clear())
     }
 
     /// The colour of a value.

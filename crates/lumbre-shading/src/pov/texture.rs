@@ -55,10 +55,19 @@ pub struct Layer {
 pub struct LayerAt<'t> {
     /// The colour.
     pub colour: Colour,
-    /// The unit normal on the side of the viewer.
+    /// The unit normal on the side of the viewer; where only colours are asked for, it may be that of the smooth surface.
     pub normal: DVec3,
     /// The finish.
     pub finish: &'t Finish,
+}
+
+/// What is asked of layers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// Colours, as what lets light pass needs them.
+    Colours,
+    /// Colours and tilted normals.
+    Normals,
 }
 
 /// Layers with the share of each stack: a texture that blends others is several stacks, whose light is blended.
@@ -74,24 +83,32 @@ impl Texture {
     }
 
     /// The stacks of layers at a point, the bottom layer of each first.
-    pub fn stacks<'t>(&'t self, p: DVec3, eye: &Eye, share: f32, out: &mut Stacks<'t>) {
+    pub fn stacks<'t>(&'t self, p: DVec3, eye: &Eye, share: f32, asked: Asked, out: &mut Stacks<'t>) {
         if share < FAINT {
             return;
         }
-        let q = self.inner(p, eye);
         match &self.kind {
-            TextureKind::Plain(_) => {
+            TextureKind::Plain(layer) => {
                 let mut layers = SmallVec::new();
-                self.push_layers(p, eye, eye.normal, &mut layers);
+                layers.push(self.layer(layer, p, eye, asked));
                 out.push((share, layers));
             }
             TextureKind::Layers(textures) => {
+                let q = self.inner(p, eye);
+                let plain = |texture: &'t Arc<Self>| match &texture.kind {
+                    TextureKind::Plain(layer) => Some(texture.layer(layer, q, eye, asked)),
+                    _ => None,
+                };
+                if let Some(layers) = textures.iter().map(plain).collect() {
+                    out.push((share, layers));
+                    return;
+                }
                 // Layers that blend textures are blends of stacks: the product of all.
                 let mut stacks: Stacks<'t> = SmallVec::new();
                 stacks.push((share, SmallVec::new()));
                 for texture in textures.iter() {
                     let mut layer: Stacks<'t> = SmallVec::new();
-                    texture.stacks(q, eye, 1.0, &mut layer);
+                    texture.stacks(q, eye, 1.0, asked, &mut layer);
                     let mut product: Stacks<'t> = SmallVec::new();
                     for (a, below) in &stacks {
                         for (b, above) in &layer {
@@ -105,22 +122,23 @@ impl Texture {
                 out.extend(stacks);
             }
             TextureKind::Map(pattern, map) => {
-                let q = pattern.point(q);
+                let q = pattern.point(self.inner(p, eye));
                 let ([(_, first), (_, second)], x) = between(map, pattern.value(q, eye));
-                first.stacks(q, eye, share * (1.0 - x as f32), out);
-                second.stacks(q, eye, share * x as f32, out);
+                first.stacks(q, eye, share * (1.0 - x as f32), asked, out);
+                second.stacks(q, eye, share * x as f32, asked, out);
             }
             TextureKind::Blocks(pattern, textures) => {
-                let q = pattern.point(q);
+                let q = pattern.point(self.inner(p, eye));
                 let index = pattern.value(q, eye) as usize;
                 if let Some(texture) = textures.get(index).or(textures.last()) {
-                    texture.stacks(q, eye, share, out);
+                    texture.stacks(q, eye, share, asked, out);
                 }
             }
             TextureKind::Average(textures) => {
+                let q = self.inner(p, eye);
                 let total: f64 = textures.iter().map(|(weight, _)| weight).sum();
                 for (weight, texture) in textures.iter() {
-                    texture.stacks(q, eye, share * (weight / total) as f32, out);
+                    texture.stacks(q, eye, share * (weight / total) as f32, asked, out);
                 }
             }
         }
@@ -131,18 +149,20 @@ impl Texture {
         self.warps.apply(p)
     }
 
-    fn push_layers<'t>(&'t self, p: DVec3, eye: &Eye, normal: DVec3, out: &mut SmallVec<[LayerAt<'t>; 2]>) {
-        let TextureKind::Plain(layer) = &self.kind else { return };
+    /// A layer of it at a point.
+    fn layer<'t>(&self, layer: &'t Layer, p: DVec3, eye: &Eye, asked: Asked) -> LayerAt<'t> {
         let q = self.inner(p, eye);
-        let tilted = layer.normal.as_ref().map_or(normal, |bumps| {
+        let bumps =
+            layer.normal.as_ref().filter(|_| asked == Asked::Normals || layer.pigment.looks_at_normals());
+        let tilted = bumps.map_or(eye.normal, |bumps| {
             // As if the texture's place were that of its normal.
-            let n = self.warps.normal_to_pattern(normal);
-            let n = if bumps.no_bump_scale { n } else { n.normalize_or(normal) };
+            let n = self.warps.normal_to_pattern(eye.normal);
+            let n = if bumps.no_bump_scale { n } else { n.normalize_or(eye.normal) };
             let n = bumps.tilted(q, n, eye);
-            self.warps.normal_from_pattern(n).normalize_or(normal)
+            self.warps.normal_from_pattern(n).normalize_or(eye.normal)
         });
         let eye = Eye { normal: tilted, ..*eye };
-        out.push(LayerAt { colour: layer.pigment.colour(q, &eye), normal: tilted, finish: &layer.finish });
+        LayerAt { colour: layer.pigment.colour(q, &eye), normal: tilted, finish: &layer.finish }
     }
 
     /// Moves the texture with its object. What is in the coordinates of a surface stays on it.
