@@ -471,7 +471,11 @@ impl<'s> Tracer<'s> {
             shift: traced.shift,
         };
         record.counts.bounce += 1;
-        let seen = self.trace(&next, record);
+        let mut seen = self.trace(&next, record);
+        if layer.finish.irid[0] != 0.0 {
+            let (to_light, to_eye) = (layer.normal.dot(direction).abs(), layer.normal.dot(d).abs());
+            seen *= self.irid(layer.finish, to_light, to_eye, here.surface.point);
+        }
         let exponent = layer.finish.reflection.exponent;
         let seen = if exponent == 1.0 { seen } else { seen.map(|c| c.max(0.0).power(1.0 / exponent)) };
         reflectance * seen
