@@ -21,13 +21,8 @@ const DIFFERENT: f64 = 0.03;
 /// … nor do those whose channels differ by more than this on average.
 const MAX_MEAN: f64 = 0.01;
 /// Scenes whose camera has several rays for each pixel: with `-A` Lumbre takes one of them, where POV-Ray takes all.
-const MANY_RAYS: [&str; 5] = [
-    "chess2.pov",
-    "ess-ortho-camera.pov",
-    "ess-persp-camera.pov",
-    "focalblur.pov",
-    "meshcam_persp_demo.pov",
-];
+const MANY_RAYS: [&str; 5] =
+    ["chess2.pov", "ess-ortho-camera.pov", "ess-persp-camera.pov", "focalblur.pov", "meshcam_persp_demo.pov"];
 /// Warnings that change nothing of a picture.
 const HARMLESS: [&str; 2] = ["the scene says", "the scene has no light"];
 
