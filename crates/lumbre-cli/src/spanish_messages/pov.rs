@@ -24,6 +24,7 @@ pub(super) const POV: &[(&str, &str)] = &[
     ("what a camera has", "lo que tiene una cámara"),
     ("the camera omnimax is rendered in perspective", "la cámara omnimax se representa en perspectiva"),
     ("the camera {} is rendered in perspective", "la cámara {=} se representa en perspectiva"),
+    ("the distribution of a mesh_camera is 0, 1, 2 or 3", "la distribución de un mesh_camera es 0, 1, 2 o 3"),
     ("a mesh_camera without meshes", "un mesh_camera sin mallas"),
     (
         "the greatest distance of a mesh_camera has no effect",

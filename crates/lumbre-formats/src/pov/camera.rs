@@ -322,7 +322,10 @@ impl Parser<'_, '_> {
         self.expect(b'{')?;
         let rays = self.whole(1.0, 65_536.0)?;
         self.comma()?;
-        let distribution = self.whole(0.0, 3.0)?;
+        let distribution = self.finite()?;
+        if ![0.0, 1.0, 2.0, 3.0].contains(&distribution) {
+            return Err(self.error("the distribution of a mesh_camera is 0, 1, 2 or 3"));
+        }
         self.comma()?;
         let mut is_smooth = false;
         let mut meshes = Vec::new();
@@ -357,14 +360,14 @@ impl Parser<'_, '_> {
         if meshes.is_empty() {
             return Err(self.error("a mesh_camera without meshes"));
         }
-        let choice = match distribution {
+        let choice = match distribution as u32 {
             0 => FaceChoice::MeshPerRay,
             1 => FaceChoice::Joined,
             2 => FaceChoice::SideBySide,
             _ => FaceChoice::ByUv { is_smooth },
         };
         // The others have but one.
-        let rays = if distribution < 2 { rays } else { 1 };
+        let rays = if distribution < 2.0 { rays } else { 1 };
         Ok(Faces { choice, rays, meshes })
     }
 }
