@@ -1,6 +1,5 @@
 //! Scenes resolved for rendering, with the queries of light transport.
 
-use std::cell::Cell;
 use std::sync::Arc;
 
 use lumbre_geometry::{Aabb, Curves, Ray, Surface};
@@ -58,9 +57,9 @@ pub struct Scene {
 pub enum PovObstacle {
     /// No surface.
     Nothing,
-    /// Only surfaces that may let light pass.
+    /// At first a surface that may let light pass.
     Clear,
-    /// A surface that stops all light.
+    /// A surface that stops all light, anywhere or at first.
     Opaque,
 }
 
@@ -362,18 +361,11 @@ impl Scene {
         if self.traits.all_stop_pov_light {
             return if self.accel.any(ray) { PovObstacle::Opaque } else { PovObstacle::Nothing };
         }
-        let meets_clear = Cell::new(false);
-        let is_opaque = |hit: &Hit| {
-            let is_opaque = self.leaf(hit).entry.stops_pov_light;
-            meets_clear.set(meets_clear.get() || !is_opaque);
-            is_opaque
-        };
-        if self.accel.any_with(ray, &Query::new().filter(&is_opaque)) {
-            PovObstacle::Opaque
-        } else if meets_clear.get() {
-            PovObstacle::Clear
-        } else {
-            PovObstacle::Nothing
+        // A query for opaque surfaces alone has to look at every crossing of each, and takes longer.
+        match self.closest(ray) {
+            None => PovObstacle::Nothing,
+            Some(hit) if self.leaf(&hit).entry.stops_pov_light => PovObstacle::Opaque,
+            Some(_) => PovObstacle::Clear,
         }
     }
 
