@@ -53,12 +53,12 @@ pub struct Scene {
 }
 
 /// What a shadow ray meets by POV-Ray's rules.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub enum PovObstacle {
     /// No surface.
     Nothing,
-    /// At first a surface that may let light pass.
-    Clear,
+    /// At first a surface that may let light pass, here.
+    Clear(Hit),
     /// A surface that stops all light, anywhere or at first.
     Opaque,
 }
@@ -365,7 +365,7 @@ impl Scene {
         match self.closest(ray) {
             None => PovObstacle::Nothing,
             Some(hit) if self.leaf(&hit).entry.stops_pov_light => PovObstacle::Opaque,
-            Some(_) => PovObstacle::Clear,
+            Some(hit) => PovObstacle::Clear(hit),
         }
     }
 

@@ -589,25 +589,23 @@ impl<'s> Tracer<'s> {
         record.counts.shadow += 1;
         let towards = ray.direction;
         let rest = (target - ray.origin).dot(towards);
-        match self.scene.pov_obstacle(&ray.with_range(NEAR, rest - NEAR)) {
+        let mut first = match self.scene.pov_obstacle(&ray.with_range(NEAR, rest - NEAR)) {
             PovObstacle::Opaque => return Spectrum::BLACK,
             PovObstacle::Nothing => return self.media_passing(&inside, &ray, rest, light),
-            PovObstacle::Clear => {}
-        }
+            PovObstacle::Clear(hit) => Some(hit),
+        };
         let mut left = Spectrum::WHITE;
-        let mut travelled = 0.0;
         for _ in 0..MAX_SURFACES {
             let rest = (target - ray.origin).dot(towards);
-            let Some(hit) = self.scene.closest(&ray.with_range(0.0, rest - NEAR)) else {
+            let further = || self.scene.closest(&ray.with_range(0.0, rest - NEAR));
+            let Some(hit) = first.take().or_else(further) else {
                 return left * self.media_passing(&inside, &ray, rest, light);
             };
             let there = self.scene.pov_hit(&ray, &hit);
             let Some(material) = there.material else { return left };
             let step = (there.surface.point - ray.origin).length();
-            let is_near = travelled + step < NEAR;
-            travelled += step;
             left *= self.media_passing(&inside, &ray, step, light);
-            if !material.visibility.no_shadow && !is_near {
+            if !material.visibility.no_shadow {
                 let smooth = there.smooth;
                 let normal = if smooth.dot(towards) > 0.0 { -smooth } else { smooth };
                 let eye = Eye {
