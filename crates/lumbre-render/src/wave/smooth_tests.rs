@@ -145,7 +145,7 @@ fn first_vertices<'s>(
         let film = DVec2::new(f64::from(id.x) + 0.37, f64::from(id.y) + 0.61);
         primary_hits.set_ray(slot, &view.ray(film, DVec2::splat(0.5), 0.0, 0.25));
     }
-    primary_hits.search(&mut record);
+    primary_hits.search();
     wave.make_vertices(&setting, &mut record);
     wave
 }
