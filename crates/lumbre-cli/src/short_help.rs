@@ -132,7 +132,9 @@ fn in_one_list(arg: Arg, command: &str, place: usize) -> Arg {
     let is_long = names.iter().map(|name| name.len()).sum::<usize>() > MAX_NAME;
     let id = arg.get_id().as_str().to_owned();
     let summary = SUMMARIES.iter().find(|(of, _)| command != "explain" && *of == id);
-    let arg = arg.help_heading(None).hide_possible_values(true).hide_default_value(true).display_order(place);
+    let takes_value = arg.get_action().takes_values();
+    let arg = arg.help_heading(None).display_order(place);
+    let arg = if takes_value { arg.hide_possible_values(true).hide_default_value(true) } else { arg };
     let arg = if is_long { arg.value_name("…") } else { arg };
     match summary {
         Some((_, summary)) => arg.help(*summary),

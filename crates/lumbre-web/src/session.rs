@@ -148,7 +148,18 @@ impl Session {
             let dark = "the scene has no light: its picture is black";
             warnings.push(format!("warning: {}: {dark}", name.display()));
         }
-        Ok(Self { scene, things, name, options, bounds, prepared, save, warnings, state: None, picture: None })
+        Ok(Self {
+            scene,
+            things,
+            name,
+            options,
+            bounds,
+            prepared,
+            save,
+            warnings,
+            state: None,
+            picture: None,
+        })
     }
 
     /// What reading and building warned of, a line each.

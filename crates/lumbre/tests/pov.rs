@@ -249,7 +249,9 @@ fn colours_are_those_of_povray() {
         format!("sphere {{ 0, 0.6 {object} texture {{ {texture} {map} {after} }} rotate -40*x }}")
     };
     let cube = |clips: &str| {
-        format!("{behind} box {{ -0.5, 0.5 pigment {{ rgb <1,0,0> }} finish {{ ambient 1 diffuse 0 }} {clips} }}")
+        format!(
+            "{behind} box {{ -0.5, 0.5 pigment {{ rgb <1,0,0> }} finish {{ ambient 1 diffuse 0 }} {clips} }}"
+        )
     };
     let beam = "light_source { <0,0,-3> rgb 1 spotlight point_at <0,0,0> radius 10 falloff 25 translate x";
     let white = "plane { -z, 0 pigment { rgb 0.5 } finish { ambient 0 diffuse 1 } }";
@@ -259,7 +261,8 @@ fn colours_are_those_of_povray() {
              finish {{ ambient 0 diffuse 0.5 reflection {reflection} irid {{ 0.5 thickness 0.3 }} }} }}"
         )
     };
-    let turned = "camera { orthographic location <0.7,0,-3> look_at <0.2,0,0> direction z right 0.01*x up 0.01*y }";
+    let turned =
+        "camera { orthographic location <0.7,0,-3> look_at <0.2,0,0> direction z right 0.01*x up 0.01*y }";
     let ramp = "plane { z, 0 pigment { gradient x color_map { [0 rgb 0] [1 rgb 1] } } finish { ambient 1 diffuse 0 } }";
     let oblique = "light_source { <0,1732.05,-1000> rgb 1 }";
     for (version, scene, expected) in [

@@ -154,7 +154,7 @@ numbers        1  -0.5  1e-3  pi; angles are in degrees, and 30° is 30
 vectors        [1, 2, 3] of 1 to 4 numbers; x, y, z are the axes
 matrices       [[1, 2], [3, 4]], row by row
 quaternions    quat(w, x, y, z), or 1 + 2*i + 3*j + 4*k
-operators      + - * / ^; 2x and 2(a + b) without *; |v| is length(v)
+operators      + - * / ^; 2x and 2(a + b) without *; |v| is the length of v
 products       M * p, A * B (first B), v * M (a row), M^-1, M^3
 names          a = ...; the last result is ans
 statements     on lines of their own, or with ; between; # begins a comment

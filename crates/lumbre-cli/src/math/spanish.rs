@@ -154,7 +154,7 @@ números        1  -0.5  1e-3  pi; los ángulos van en grados, y 30° es 30
 vectores       [1, 2, 3] de 1 a 4 números; x, y, z son los ejes
 matrices       [[1, 2], [3, 4]], fila por fila
 cuaterniones   quat(w, x, y, z), o 1 + 2*i + 3*j + 4*k
-operadores     + - * / ^; 2x y 2(a + b) sin *; |v| es length(v)
+operadores     + - * / ^; 2x y 2(a + b) sin *; |v| es la longitud de v
 productos      M * p, A * B (primero B), v * M (una fila), M^-1, M^3
 nombres        a = ...; el último resultado es ans
 sentencias     en líneas propias, o separadas por ; un comentario empieza con #

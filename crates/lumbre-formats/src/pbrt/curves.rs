@@ -7,7 +7,7 @@ use lumbre_math::DVec3;
 use lumbre_scene::{GeometryDesc, ShapeDesc};
 
 use super::convert::Converter;
-use super::params::{Params, Type};
+use super::params::{AT_MOST_F32, Params, Type};
 use super::source::{AtSpot, Result};
 use crate::Diagnostic;
 
@@ -89,8 +89,10 @@ impl Converter<'_, '_> {
     fn curve_width(&self, params: &Params, name: &'static str, default: f64) -> Result<f64> {
         let width = params.float(name, default)?;
         let name = if params.has(name) { name } else { "width" };
-        let is_width = width as f32 > 0.0 && (width as f32).is_finite();
-        if is_width { Ok(width) } else { params.out_of_range(name, width, "more than 0") }
+        if width as f32 > 0.0 && (width as f32).is_finite() {
+            return Ok(width);
+        }
+        params.out_of_range(name, width, if width > 1.0 { AT_MOST_F32 } else { "more than 0" })
     }
 
     fn curve_triples(&self, params: &Params, name: &'static str, ty: Type) -> Result<Option<Vec<DVec3>>> {
