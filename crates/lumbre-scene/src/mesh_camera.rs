@@ -302,7 +302,7 @@ mod tests {
     fn texture_coordinates_say_where_on_which_face_a_ray_starts() {
         let big = CameraFace {
             corners: [Vec3::ZERO, Vec3::new(8.0, 0.0, 0.0), Vec3::new(0.0, 8.0, 0.0)],
-            normals: [Vec3::new(0.0, 0.0, -1.0), Vec3::new(0.5, 0.0, -1.0), Vec3::new(0.0, 0.0, -1.0)],
+            normals: [Vec3::NEG_Z, Vec3::new(0.5, 0.0, -1.0).normalize(), Vec3::NEG_Z],
             uvs: [Vec2::ZERO, Vec2::X, Vec2::Y],
         };
         let camera = |is_smooth| {

@@ -98,6 +98,8 @@ pub struct Clearcoat {
     /// How much of the light that the lacquer reflects back down darkens the base, in [0, 1]: none at 0. White stays
     /// white.
     pub darkening: f32,
+    /// The α of the base before it was regularised, if it was: a coat darkens both alike.
+    pub base_alpha: Option<f32>,
 }
 
 impl Clearcoat {
@@ -112,6 +114,7 @@ impl Clearcoat {
         eta: Self::ETA,
         color: Spectrum::WHITE,
         darkening: 0.0,
+        base_alpha: None,
     };
 
     fn face(&self) -> Dielectric {
@@ -220,7 +223,9 @@ impl Principled {
     #[must_use]
     pub fn regularized(self) -> Self {
         let alpha = self.coat.face().facets.regularized().alpha().x;
-        Self { facets: self.facets.regularized(), coat: Clearcoat { alpha, ..self.coat }, ..self }
+        let base_alpha = Some(self.base_alpha());
+        let coat = Clearcoat { alpha, base_alpha, ..self.coat };
+        Self { facets: self.facets.regularized(), coat, ..self }
     }
 
     /// Below this difference of η from 1 there is no refraction.
@@ -244,12 +249,17 @@ impl Principled {
         let mirrored = ALBEDO.face_mean(0.0, eta);
         let even = 1.0 - (1.0 - mirrored) / (eta * eta);
         let diffuse_share = (1.0 - self.metallic) * (1.0 - self.transmission);
-        let rough = diffuse_share + (1.0 - diffuse_share) * self.facets.alpha().x.min(1.0).sqrt();
+        let rough = diffuse_share + (1.0 - diffuse_share) * self.base_alpha().min(1.0).sqrt();
         let back = mirrored + (even - mirrored) * rough;
         albedo.map(|e| {
             let left = (1.0 - back) / (1.0 - crate::unit(e) * back);
             1.0 + (left - 1.0) * darkening
         })
+    }
+
+    /// The roughness of the base by which a coat darkens it.
+    fn base_alpha(&self) -> f32 {
+        self.coat.base_alpha.unwrap_or(self.facets.alpha().x)
     }
 
     fn spread(&self) -> f32 {

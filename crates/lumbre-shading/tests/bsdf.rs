@@ -1506,6 +1506,7 @@ fn random_principled(random: &mut RandomStream) -> Principled {
             eta: 1.0 + 2.0 * random.next_f32(),
             color: if random.next_f32() > 0.5 { random_colour(random) } else { Spectrum::WHITE },
             darkening: (2.0 * random.next_f32() - 1.0).max(0.0),
+            base_alpha: None,
         },
     }
 }

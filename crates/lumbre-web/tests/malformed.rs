@@ -9,6 +9,9 @@ use std::time::Duration;
 use lumbre::formats::HeldFiles;
 use lumbre_web::{Problem, Session, Wanted};
 
+#[path = "../../lumbre-cli/tests/malformed_files.rs"]
+mod malformed_files;
+
 const HEAD: &str = "Film \"rgb\" \"integer xresolution\" 4 \"integer yresolution\" 3\n\
                     Sampler \"sobol\" \"integer pixelsamples\" 1\nLookAt 0 -8 3 0 0 0 0 0 1\nCamera \"perspective\"\n\
                     WorldBegin\nLightSource \"infinite\"\n";
@@ -36,10 +39,13 @@ fn unescaped(text: &str) -> Vec<u8> {
 }
 
 /// Opens a file beside others, and renders what opens; or casts the rays that it holds.
-fn tried(name: &str, bytes: &[u8]) -> Result<Vec<String>, Problem> {
+fn tried(name: &str, bytes: &[u8], own: Vec<(String, Vec<u8>)>) -> Result<Vec<String>, Problem> {
     let mut files = HeldFiles::default();
     for text in ["a.txt", "b.txt"] {
         files.insert(text, *b"text\n");
+    }
+    for (name, bytes) in own {
+        files.insert(&name, bytes);
     }
     files.insert("good.pbrt", format!("{HEAD}Shape \"sphere\"\n").into_bytes());
     if name.ends_with(".csv") || name.ends_with(".npy") {
@@ -65,10 +71,11 @@ fn every_malformed_file_is_refused_in_the_words_of_the_program() {
             let (status, said) = rest.split_once('\n').unwrap();
             let body = format!("{body}\n");
             let body = body.strip_suffix("\\\n").unwrap_or(&body);
-            let (head, body) = body.strip_prefix("@HEAD\n").map_or(("", body), |body| (HEAD, body));
+            let (own, body) = malformed_files::files_of(body);
+            let (head, body) = body.strip_prefix("@HEAD\n").map_or(("", body.as_str()), |body| (HEAD, body));
             let said = said.lines().next().unwrap();
             all += 1;
-            let found = match tried(name, &[head.as_bytes(), &unescaped(body)].concat()) {
+            let found = match tried(name, &[head.as_bytes(), &unescaped(body)].concat(), own) {
                 Ok(warnings) => warnings.first().cloned().unwrap_or_default(),
                 Err(problem) => format!("error: {}", problem.message.lines().next().unwrap_or_default()),
             };
