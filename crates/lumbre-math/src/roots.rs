@@ -104,9 +104,9 @@ pub fn keeps_sign<const N: usize>(c: &[f64; N]) -> bool {
     // c[i] over the binomial coefficient (N - 1, i); the sums of Pascal's triangle are the coefficients.
     let mut b = *c;
     let mut choices = 1.0;
-    for i in 1..N {
+    for (i, b) in b.iter_mut().enumerate().skip(1) {
         choices *= (N - i) as f64 / i as f64;
-        b[i] /= choices;
+        *b /= choices;
     }
     let size = b.iter().map(|x| x.abs()).sum::<f64>() * (1 << N) as f64;
     for k in 1..N {

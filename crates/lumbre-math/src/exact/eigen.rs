@@ -58,7 +58,7 @@ fn characteristic(m: &Rows) -> Polynomial {
         let minor = kept.map(|i| (0..n).filter(|&j| has(j)).map(|j| m[i][j].clone()).collect()).collect();
         let minor = expanded(&minor);
         let k = set.count_ones() as usize;
-        coefficients[n - k] = coefficients[n - k].plus(&if k % 2 == 0 { minor } else { minor.negated() });
+        coefficients[n - k] = coefficients[n - k].plus(&if k.is_multiple_of(2) { minor } else { minor.negated() });
     }
     coefficients
 }
@@ -316,8 +316,9 @@ mod tests {
             for _ in 0..5 {
                 let (i, f) = (random.next_below(4), random.next_below(5) as f64 - 2.0);
                 let j = (i + 1 + random.next_below(3)) % 4;
-                for k in 0..4 {
-                    m[i][k] += f * m[j][k];
+                let added = m[j];
+                for (x, y) in m[i].iter_mut().zip(added) {
+                    *x += f * y;
                 }
                 for row in &mut m {
                     row[j] -= f * row[i];
