@@ -343,15 +343,19 @@ impl Parser<'_, '_> {
                 meshes_of(&object, &Transform::IDENTITY, &mut found);
                 for (mesh, map) in found {
                     let key = Arc::as_ptr(&mesh) as usize;
-                    if !known.contains_key(&key) {
-                        let count = mesh.triangles.len() as u64;
-                        self.budget.bytes(count * size_of::<CameraFace>() as u64, "faces of a camera")?;
-                        let faces = camera_faces(&mesh);
-                        known.insert(key, (mesh, faces));
-                    }
+                    let faces = match known.get(&key) {
+                        Some((_, faces)) => Arc::clone(faces),
+                        None => {
+                            let count = mesh.triangles.len() as u64;
+                            self.budget.bytes(count * size_of::<CameraFace>() as u64, "faces of a camera")?;
+                            let faces = camera_faces(&mesh);
+                            known.insert(key, (mesh, Arc::clone(&faces)));
+                            faces
+                        }
+                    };
                     let size = size_of::<(Arc<[CameraFace]>, Transform)>();
                     self.budget.bytes(size as u64, "meshes of a camera")?;
-                    meshes.push((Arc::clone(&known[&key].1), map));
+                    meshes.push((faces, map));
                 }
             } else if self.float()? > 0.0 {
                 self.warn("the greatest distance of a mesh_camera has no effect");

@@ -309,8 +309,8 @@ impl Code {
     /// Its value.
     pub fn value(&self, arguments: &[f64]) -> f64 {
         match self.operations.len() {
-            ..=FEW => self.run(arguments, &mut [0.0; FEW]),
-            ..=MANY => self.run(arguments, &mut [0.0; MANY]),
+            count if count <= FEW => self.run(arguments, &mut [0.0; FEW]),
+            count if count <= MANY => self.run(arguments, &mut [0.0; MANY]),
             count => self.run(arguments, &mut vec![0.0; count]),
         }
     }
