@@ -58,7 +58,8 @@ fn characteristic(m: &Rows) -> Polynomial {
         let minor = kept.map(|i| (0..n).filter(|&j| has(j)).map(|j| m[i][j].clone()).collect()).collect();
         let minor = expanded(&minor);
         let k = set.count_ones() as usize;
-        coefficients[n - k] = coefficients[n - k].plus(&if k.is_multiple_of(2) { minor } else { minor.negated() });
+        coefficients[n - k] =
+            coefficients[n - k].plus(&if k.is_multiple_of(2) { minor } else { minor.negated() });
     }
     coefficients
 }
