@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-/// The files of the lines in front that make some, and the rest of the body: `@FILE NAME text`, with `\n` between lines;
+/// The files of the lines in front that make some, and the rest of the body: `@FILE NAME text`, with `\n` between
+/// lines;
 /// `@CUT NAME COUNT of SOURCE`, the first bytes of a picture's file; `@PUT NAME HEX at OFFSET of SOURCE`, with some
 /// bytes replaced.
 pub(crate) fn files_of(body: &str) -> (Vec<(String, Vec<u8>)>, String) {

@@ -38,8 +38,8 @@ struct Key {
     global: bool,
 }
 
-/// Minimum number of samples per pixel of a camera with a lens, or with several rays for each pixel, whose mean is noise
-/// otherwise.
+/// The least number of samples per pixel of a camera with a lens, or with several rays for each pixel: the mean of
+/// fewer is noise.
 const MIN_BLUR_SAMPLES: u32 = 64;
 
 /// A description that is being made.

@@ -4,13 +4,12 @@ use std::collections::HashMap;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Elementary, Transform};
+use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Elementary, Transform, Vec2};
 use lumbre_scene::{
     Camera, CameraFace, CameraKind, FaceChoice, MeshCamera, MeshDesc, SphericalMapping, WideProjection,
 };
 
 use super::lexer::Kind;
-use super::meshes::camera_faces;
 use super::objects::{Form, Object};
 use super::value::Value;
 use super::{Parser, Result};
@@ -389,4 +388,23 @@ fn meshes_of(object: &Object, parent: &Transform, found: &mut Vec<(Arc<MeshDesc>
 /// A camera for values.
 pub(super) fn shared(camera: CameraStatement) -> Value {
     Value::Camera(Rc::new(camera))
+}
+
+/// The faces of a mesh for cameras: corners in the order in which the scene writes them.
+fn camera_faces(mesh: &MeshDesc) -> Arc<[CameraFace]> {
+    let face = |triangle: &[u32; 3]| {
+        let mut order = *triangle;
+        order.sort_unstable();
+        let corners = order.map(|i| mesh.positions[i as usize]);
+        let [a, b, c] = corners;
+        let flat = (c - a).cross(b - a);
+        let normals = mesh.normals.as_ref();
+        let uvs = mesh.uvs.as_ref();
+        CameraFace {
+            corners,
+            normals: order.map(|i| normals.map_or(flat, |normals| normals[i as usize])),
+            uvs: order.map(|i| uvs.map_or(Vec2::ZERO, |uvs| uvs[i as usize])),
+        }
+    };
+    mesh.triangles.iter().map(face).collect()
 }

@@ -35,7 +35,7 @@ impl Draft {
     fn inline(&mut self, code: &Code, arguments: &[Register]) -> Option<Register> {
         let has_repeats =
             code.operations.iter().any(|operation| matches!(operation, Operation::Repeat { .. }));
-        if has_repeats || self.operations.len() + code.operations.len() > MOST_INLINE {
+        if has_repeats || self.operations.len() + code.operations.len() > MAX_INLINE {
             return None;
         }
         let mut registers: Vec<Register> = Vec::with_capacity(code.operations.len());
@@ -69,7 +69,7 @@ impl Draft {
 }
 
 /// No more operations are put in place of a call.
-const MOST_INLINE: usize = 64;
+const MAX_INLINE: usize = 64;
 
 impl Parser<'_, '_> {
     /// `function { … }` or `function(a, b) { … }`, whose word was taken.

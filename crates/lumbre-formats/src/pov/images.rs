@@ -240,7 +240,7 @@ impl Parser<'_, '_> {
         }
     }
 
-    /// A colour in the working space, or a height: of light, if it is decoded as usual, else of the numbers of the file.
+    /// A colour in the working space, or a height: of light, if it is decoded as usual, else of the file's numbers.
     fn decoded(&self, c: Spectrum, decoding: Decoding, purpose: Use) -> Spectrum {
         let light = match decoding {
             Decoding::Usual => c,

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use lumbre_math::{DVec2, DVec3, Vec2, Vec3};
-use lumbre_scene::{CameraFace, MeshDesc};
+use lumbre_scene::MeshDesc;
 use lumbre_shading::pov::Texture;
 
 use super::blob::{Ball, Blob};
@@ -358,25 +358,6 @@ fn push(all: &mut Triangles, corners: [DVec3; 3], normals: Option<[DVec3; 3]>, u
         all.uvs.push(Vec2::new(uv.x as f32, uv.y as f32));
     }
     all.has_uvs |= uvs.is_some();
-}
-
-/// The faces of a mesh for cameras: corners in the order in which the scene writes them.
-pub(super) fn camera_faces(mesh: &MeshDesc) -> Arc<[CameraFace]> {
-    let face = |triangle: &[u32; 3]| {
-        let mut order = *triangle;
-        order.sort_unstable();
-        let corners = order.map(|i| mesh.positions[i as usize]);
-        let [a, b, c] = corners;
-        let flat = (c - a).cross(b - a);
-        let normals = mesh.normals.as_ref();
-        let uvs = mesh.uvs.as_ref();
-        CameraFace {
-            corners,
-            normals: order.map(|i| normals.map_or(flat, |normals| normals[i as usize])),
-            uvs: order.map(|i| uvs.map_or(Vec2::ZERO, |uvs| uvs[i as usize])),
-        }
-    };
-    mesh.triangles.iter().map(face).collect()
 }
 
 /// What triangles enclose, by a direction to look for them.

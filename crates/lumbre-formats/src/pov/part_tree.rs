@@ -21,7 +21,7 @@ struct Node {
     parts: [u32; 2],
 }
 
-/// A leaf has at most so many parts.
+/// A leaf has at most this many parts.
 const LEAF: usize = 4;
 
 impl PartTree {
