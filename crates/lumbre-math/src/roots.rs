@@ -476,7 +476,7 @@ mod tests {
     }
 
     #[test]
-    fn a_polynomial_that_keeps_its_sign_has_no_root_in_the_unit_interval() {
+    fn a_polynomial_that_keeps_its_sign_has_no_root() {
         fn check<const N: usize>(seed: u64) -> [u32; 2] {
             let mut state = seed;
             let mut counts = [0; 2];

@@ -253,7 +253,7 @@ mod tests {
     // All places are those of POV-Ray 3.7 for the same meshes.
 
     #[test]
-    fn a_ray_leaves_the_middle_of_a_face_by_the_order_of_its_corners() {
+    fn a_ray_leaves_a_face_by_the_order_of_its_corners() {
         let slanted = face([[0.0, 0.0, 0.0], [1.0, 0.0, -1.0], [0.0, 1.0, 0.0]]);
         let [a, b, c] = slanted.corners;
         let faces: Arc<[CameraFace]> = [slanted, CameraFace { corners: [a, c, b], ..slanted }].into();

@@ -232,8 +232,8 @@ impl Principled {
     pub(crate) const NO_BORDER: f32 = 1e-3;
 
     /// The factor by which light that a coat reflects back down darkens the base: OpenPBR Surface 1.1 (Academy Software
-    /// Foundation, 2024), "Coat darkening". A share K of what leaves the base comes back, of which the base reflects its
-    /// albedo E: what remains of the first reflection is (1 − K) / (1 − E K).
+    /// Foundation, 2024), "Coat darkening". A share K of what leaves the base comes back, of which the base reflects
+    /// its albedo E: what remains of the first reflection is (1 − K) / (1 − E K).
     fn darkened(&self) -> Spectrum {
         let Clearcoat { weight, eta, darkening, .. } = self.coat;
         if weight == 0.0 || darkening == 0.0 {

@@ -908,7 +908,8 @@ fn a_coloured_coat_tints_by_the_way_through_it() {
 
 #[test]
 fn a_coat_darkens_grey_by_the_light_that_it_reflects_back_down() {
-    // A coat of index 1.5 reflects 0.0918 of even light from outside, so 1 - 0.9082 / 1.5² = 0.5963 from inside. Grey of
+    // A coat of index 1.5 reflects 0.0918 of even light from outside, so 1 - 0.9082 / 1.5² = 0.5963 from inside.
+    // Grey of
     // 0.5 without reflections of its own keeps (1 - 0.5963) / (1 - 0.5 · 0.5963) = 0.5752 of itself.
     let coat = Clearcoat { weight: 1.0, darkening: 1.0, ..Clearcoat::NONE };
     let grey =

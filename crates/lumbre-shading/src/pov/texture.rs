@@ -55,7 +55,7 @@ pub struct Layer {
 pub struct LayerAt<'t> {
     /// The colour.
     pub colour: Colour,
-    /// The unit normal on the side of the viewer; where only colours are asked for, it may be that of the smooth surface.
+    /// The unit normal on the side of the viewer; where only colours are asked for, it may be the smooth one.
     pub normal: DVec3,
     /// The finish.
     pub finish: &'t Finish,
