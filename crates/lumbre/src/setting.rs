@@ -787,7 +787,8 @@ mod tests {
             for name in names {
                 let said = set(&mut desc.clone(), &format!("material.m.{name}=0.7"));
                 assert!(
-                    said.is_ok() || ["ior", "eta", "iridescence_ior", "clearcoat_ior"].contains(&name),
+                    said.is_ok()
+                        || ["ior", "eta", "iridescence_ior", "clearcoat_ior", "coat_ior"].contains(&name),
                     "{name}: {said:?}"
                 );
                 assert!(set(&mut desc.clone(), &format!("material.m.{name}=1.25e31")).is_err(), "{name}");
