@@ -72,7 +72,7 @@ const ESSENTIAL: [(&str, &[&str]); 3] = [
 ];
 
 /// What `-h` says of options of `render` and `view` whose first sentence is long.
-const SUMMARIES: [(&str, &str); 12] = [
+const SUMMARIES: [(&str, &str); 13] = [
     ("time", "Stop after this time, as 90s, 2m or 1h30m"),
     ("noise", "Stop sampling a pixel at this share of noise, such as 0.02"),
     ("integrator", "What each pixel shows: light (path, caustics, …) or normals, depth, albedo, uv"),
@@ -85,6 +85,7 @@ const SUMMARIES: [(&str, &str); 12] = [
     ("background", "What is behind everything: env, studio, transparent, a colour or an image"),
     ("settings", "Set a parameter of the scene, as material.0.color=red or camera.fov=40"),
     ("resume", "Continue from a checkpoint"),
+    ("export", "Write a page of the finished picture into this folder instead of showing it"),
 ];
 
 /// How many examples `-h` has.

@@ -96,10 +96,10 @@ fn white_materials_stay_white_wherever_they_are() {
         ("\"openpbr\" \"rgb base_color\" [1 1 1] \"float transmission_weight\" 1", 256, 0.01),
         (
             "\"openpbr\" \"float subsurface_weight\" 1 \"rgb subsurface_color\" [1 1 1] \"float subsurface_radius\" .2",
-            16,
+            256,
             0.01,
         ),
-        ("\"subsurface\" \"rgb reflectance\" [1 1 1] \"rgb mfp\" [.1 .1 .1]", 16, 0.01),
+        ("\"subsurface\" \"rgb reflectance\" [1 1 1] \"rgb mfp\" [.1 .1 .1]", 256, 0.01),
     ] {
         for (place, text) in everywhere(&format!("Material {material}"), lights) {
             assert_near(mean(&opened(&text, &[]), spp), [1.0; 3], slack, &format!("{material} {place}"));
