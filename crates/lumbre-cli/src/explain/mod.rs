@@ -54,8 +54,8 @@ pub struct Request {
     /// The pixel, from 0,0 in the upper left corner.
     #[arg(long, value_name = "X,Y", value_parser = pixel)]
     pub pixel: Option<(u32, u32)>,
-    /// A ray instead of a pixel: its origin and direction (of any length but 0), then optionally its range of t (by
-    /// default 0 to infinity).
+    /// A ray instead of a pixel: origin, direction and, if wanted, its range of t. The direction is of any length but
+    /// 0, the range from 0 to infinity by default.
     #[arg(long, value_name = "OX,OY,OZ,DX,DY,DZ[,TMIN,TMAX]", allow_hyphen_values = true, value_parser = ray, conflicts_with = "pixel")]
     pub ray: Option<Ray>,
     /// The format of the explanation.
@@ -73,14 +73,14 @@ pub struct Request {
     /// Explain only the visible surface, not those behind it.
     #[arg(long)]
     pub nearest: bool,
-    /// Explain this shape, whether the ray hits it or not: its number, its kind, or the name of its material.
+    /// Explain this shape, hit or missed: its number, its kind, or the name of its material.
     #[arg(long, value_name = "NAME|N", conflicts_with = "nearest")]
     pub shape: Option<String>,
     /// Explain all shapes, also those that the ray misses.
     #[arg(long, conflicts_with_all = ["nearest", "shape"])]
     pub all_shapes: bool,
-    /// Print only the sections with these keys, the keys of JSON: camera, equation, Quadratic, hit, transform, light,
-    /// radiance, …
+    /// Print only the sections with these keys of JSON, such as hit,radiance. More: camera, equation, Quadratic,
+    /// transform, light, …
     #[arg(long, value_name = "KEY,…", value_delimiter = ',')]
     pub only: Vec<String>,
     /// Digits of the numbers: full, or at most this many, such as 6. JSON always has all.
