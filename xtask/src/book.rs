@@ -56,7 +56,8 @@ pub(crate) struct Book {
 fn write_coverage() -> Result<()> {
     let mut cargo = Command::new("cargo");
     cargo.current_dir(root()).env("LUMBRE_UPDATE_PAGES", "1");
-    cargo.args(["test", "--quiet", "--package", "lumbre-formats", "--lib", "pbrt::coverage"]);
+    // Of the whole workspace, so that it is what the tests have compiled.
+    cargo.args(["test", "--quiet", "--workspace", "--lib", "pbrt::coverage"]);
     if !cargo.status().context("cargo cannot be started")?.success() {
         bail!("{COVERAGE} cannot be written");
     }
