@@ -16,6 +16,7 @@ use crate::film::{
     BucketSums, Exposure, FeatureSums, Filter, FilterShape, GuideSums, MAX_PIXELS, Pixel, PixelBounds,
     RatioSums, SurfaceSums,
 };
+use crate::transport::Sampler;
 use crate::workers::Workers;
 
 /// Everything about a picture that is not in the scene.
@@ -198,6 +199,12 @@ impl RenderOptions {
         }
         let cameras = scene.cameras();
         cameras.get(self.camera).ok_or(RenderError::NoSuchCamera { index: self.camera, count: cameras.len() })
+    }
+
+    /// The numbers by which a sample of a pixel meets surfaces that cover it, or passes through: see
+    /// [`Scene::closest_seen`].
+    pub fn coverage_numbers(&self, (x, y): (u32, u32), index: u32) -> [f32; 2] {
+        Sampler::new(&self.sampler).numbers(x, y, index).coverage()
     }
 
     /// Another size; the film's crop keeps its share of it.

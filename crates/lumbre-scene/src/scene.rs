@@ -7,6 +7,7 @@ use lumbre_kernel::{Accel, Hit, Query};
 use lumbre_math::random::{combine, hash_dvec3, uniform_f32};
 use lumbre_math::{DVec2, DVec3, Transform, Vec3};
 use lumbre_shading::{FloatTexture, Material, Spectrum};
+use smallvec::SmallVec;
 
 use crate::footprint::SurfaceFootprint;
 use crate::light::lanes::LaneLights;
@@ -297,14 +298,33 @@ impl Scene {
     }
 
     /// The closest hit visible to a camera: as [`Scene::closest`], also skipping the backs of one-sided
-    /// materials.
-    pub fn closest_seen(&self, ray: &Ray) -> Option<Hit> {
-        if self.traits.has_one_sided {
-            let is_seen = |hit: &Hit| !self.is_back_of_one_sided(ray, hit) && self.is_solid(ray, hit);
-            self.accel.closest_with(ray, &Query::new().filter(&is_seen))
-        } else {
-            self.closest(ray)
+    /// materials. Each of the two nearest surfaces that cover the ray is hit if its coverage is above its number, in
+    /// [0, 1): numbers that are stratified over the rays of a pixel leave little noise in its alpha. A hash decides about
+    /// surfaces behind.
+    pub fn closest_seen(&self, ray: &Ray, numbers: [f32; 2]) -> Option<Hit> {
+        if !self.traits.has_one_sided && !self.traits.has_cutouts {
+            return self.accel.closest(ray);
         }
+        let mut passed = SmallVec::<[u64; 2]>::new();
+        for number in numbers {
+            let covers = |hit: &Hit| {
+                !passed.contains(&self.place_of(hit))
+                    && !self.is_back_of_one_sided(ray, hit)
+                    && self.coverage(ray, hit) > 0.0
+            };
+            let hit = self.accel.closest_with(ray, &Query::new().filter(&covers))?;
+            if number < self.coverage(ray, &hit) {
+                return Some(hit);
+            }
+            let place = self.place_of(&hit);
+            passed.push(place);
+        }
+        let is_seen = |hit: &Hit| {
+            !passed.contains(&self.place_of(hit))
+                && !self.is_back_of_one_sided(ray, hit)
+                && self.is_solid(ray, hit)
+        };
+        self.accel.closest_with(ray, &Query::new().filter(&is_seen))
     }
 
     /// [`Scene::closest`] for every ray.
@@ -320,16 +340,23 @@ impl Scene {
         }
     }
 
-    /// [`Scene::closest_seen`] for every ray.
+    /// [`Scene::closest_seen`] for every ray, with its numbers by its index.
     ///
     /// # Panics
     /// If the numbers of hits and rays differ.
-    pub fn closest_seen_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        if self.traits.has_one_sided {
+    pub fn closest_seen_batch(
+        &self,
+        rays: &[Ray],
+        numbers: impl Fn(usize) -> [f32; 2],
+        hits: &mut [Option<Hit>],
+    ) {
+        if self.traits.has_one_sided || self.traits.has_cutouts {
             assert_eq!(rays.len(), hits.len(), "a place for each hit");
-            hits.iter_mut().zip(rays).for_each(|(hit, ray)| *hit = self.closest_seen(ray));
+            for (i, (hit, ray)) in hits.iter_mut().zip(rays).enumerate() {
+                *hit = self.closest_seen(ray, numbers(i));
+            }
         } else {
-            self.closest_batch(rays, hits);
+            self.accel.closest_batch(rays, hits);
         }
     }
 
@@ -649,33 +676,42 @@ impl Scene {
         }
     }
 
-    /// Whether a hit blocks light. Partial alpha is decided by a hash of the ray and what it hit, so the result is
-    /// deterministic.
-    pub fn is_solid(&self, ray: &Ray, hit: &Hit) -> bool {
+    /// The share of the rays through a hit that it stops, from its alpha: 0 of an interface.
+    pub fn coverage(&self, ray: &Ray, hit: &Hit) -> f32 {
         let leaf = self.leaf(hit);
-        let entry = leaf.entry;
-        if !entry.is_visible() {
-            return false;
+        if !leaf.entry.is_visible() {
+            return 0.0;
         }
-        let Some(alpha) = &entry.alpha else { return true };
-        let coverage = match **alpha {
-            FloatTexture::Constant(coverage) => coverage,
-            _ => {
+        match leaf.entry.alpha.as_deref() {
+            None => 1.0,
+            Some(FloatTexture::Constant(coverage)) => *coverage,
+            Some(alpha) => {
                 let geometric = self.accel.surface(ray, hit);
                 let shaded = self.shading_geometry(&leaf, &geometric, ray, hit);
                 alpha.evaluate(&shaded.point_context())
             }
-        };
-        if coverage >= 1.0 {
-            return true;
+        }
+    }
+
+    /// Whether a hit blocks light. Partial alpha is decided by a hash of the ray and what it hit, so the result is
+    /// deterministic.
+    pub fn is_solid(&self, ray: &Ray, hit: &Hit) -> bool {
+        let coverage = self.coverage(ray, hit);
+        if coverage <= 0.0 || coverage >= 1.0 {
+            return coverage >= 1.0;
         }
         let line = combine(hash_dvec3(ray.origin), hash_dvec3(ray.direction));
-        let mut place = u64::from(hit.id) << 32 | u64::from(hit.primitive);
-        place = hit.instances.iter().fold(place, |place, &instance| combine(place, instance.into()));
-        if !matches!(entry.form, Form::Mesh(_)) {
-            // A ray may hit it more than once. Of a triangle, `t` would depend on the precision.
-            place = combine(place, hit.root.t.to_bits());
+        uniform_f32(combine(line, self.place_of(hit))) < coverage
+    }
+
+    /// A hash of what a hit is on: the same for all hits of a triangle.
+    fn place_of(&self, hit: &Hit) -> u64 {
+        let place = u64::from(hit.id) << 32 | u64::from(hit.primitive);
+        let place = hit.instances.iter().fold(place, |place, &instance| combine(place, instance.into()));
+        if matches!(self.leaf(hit).entry.form, Form::Mesh(_)) {
+            return place;
         }
-        uniform_f32(combine(line, place)) < coverage
+        // A ray may hit it more than once. Of a triangle, `t` would depend on the precision.
+        combine(place, hit.root.t.to_bits())
     }
 }

@@ -616,7 +616,7 @@ fn cameras_see_through_one_sided_backs_and_light_does_not() {
         let scene = Scene::build(desc).unwrap();
         for (from, towards, is_front) in [(9.0, DVec3::NEG_Z, !reverse), (-2.0, DVec3::Z, reverse)] {
             let ray = Ray::new(DVec3::new(0.5, 0.25, from), towards);
-            assert_eq!(scene.closest_seen(&ray).is_some(), is_front, "{mirrored} {reverse} {from}");
+            assert_eq!(scene.closest_seen(&ray, [0.5; 2]).is_some(), is_front, "{mirrored} {reverse} {from}");
             assert!(scene.closest(&ray).is_some() && scene.is_occluded(&ray));
             count += 1;
         }

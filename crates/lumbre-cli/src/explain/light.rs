@@ -27,6 +27,8 @@ pub(super) struct Path<'a> {
     pub(super) kind: &'a IntegratorKind,
     /// What is up in the world.
     pub(super) up: DVec3,
+    /// What decides about the surfaces that cover the camera ray.
+    pub(super) coverage: [f32; 2],
 }
 
 /// How the radiance of a sample is exposed and added to its pixel.
@@ -268,8 +270,7 @@ impl Path<'_> {
             }
         }
         if met.depth > 0 && met.depth <= self.depth {
-            let wanted =
-                Wanted { nearest: true, is_from_camera: false, shapes: None, up: self.up, path: &[] };
+            let wanted = Wanted { nearest: true, from_camera: None, shapes: None, up: self.up, path: &[] };
             let told = surfaces(self.scene, &met.ray, self.things, &wanted, texts);
             section.sections.extend(told.ok());
         }
@@ -289,7 +290,11 @@ impl Path<'_> {
 
     fn interaction(&self, met: &Met) -> Option<Interaction<'_>> {
         let scene = self.scene.resolved();
-        let hit = if met.depth == 0 { scene.closest_seen(&met.ray) } else { scene.closest(&met.ray) }?;
+        let hit = if met.depth == 0 {
+            scene.closest_seen(&met.ray, self.coverage)
+        } else {
+            scene.closest(&met.ray)
+        }?;
         Some(scene.interaction(&met.ray, &hit, &Footprint::Point))
     }
 

@@ -45,7 +45,17 @@ impl Question<'_> {
         section.fact(self.texts.weight, sample.weight);
         let exposed =
             light::Exposed { radiance: sample.radiance, exposure: options.exposure, weight: sample.weight };
-        self.along(section, scene, options, &sample.ray, Some(exposed), sample.radiance, &sample.events)
+        let coverage = options.coverage_numbers(pixel, self.sample);
+        self.along(
+            section,
+            scene,
+            options,
+            &sample.ray,
+            coverage,
+            Some(exposed),
+            sample.radiance,
+            &sample.events,
+        )
     }
 
     /// For a ray, whose direction has any length but 0.
@@ -62,7 +72,8 @@ impl Question<'_> {
         let scaled = ray.direction / ray.direction.abs().max_element();
         let unit = Ray { direction: scaled.normalize(), ..*ray };
         let (radiance, events) = scene.explain_ray(options, &unit, self.sample)?;
-        self.along(camera::given(ray, self.texts), scene, options, ray, None, radiance, &events)
+        let coverage = options.coverage_numbers((0, 0), self.sample);
+        self.along(camera::given(ray, self.texts), scene, options, ray, coverage, None, radiance, &events)
     }
 
     /// The world axis that is most upwards in the picture.
@@ -82,6 +93,7 @@ impl Question<'_> {
         scene: &Scene,
         options: &RenderOptions,
         ray: &Ray,
+        coverage: [f32; 2],
         exposed: Option<light::Exposed>,
         radiance: Spectrum,
         events: &[Event],
@@ -89,9 +101,9 @@ impl Question<'_> {
         let &Self { things, texts, depth, nearest, .. } = self;
         let (up, path) = (self.up(scene, options), light::corners(events));
         let shapes = self.shapes.as_ref();
-        let asked = surfaces::Wanted { nearest, is_from_camera: true, shapes, up, path: &path };
+        let asked = surfaces::Wanted { nearest, from_camera: Some(coverage), shapes, up, path: &path };
         let met = surfaces::surfaces(scene, ray, things, &asked, texts)?;
-        let path = light::Path { scene, things, texts, depth, kind: &options.integrator.kind, up };
+        let path = light::Path { scene, things, texts, depth, kind: &options.integrator.kind, up, coverage };
         Ok(vec![from, met, path.tell(exposed, radiance, events)])
     }
 }

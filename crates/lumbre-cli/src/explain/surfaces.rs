@@ -44,7 +44,8 @@ pub(super) enum Chosen {
 pub(super) struct Wanted<'a> {
     /// Whether to show only the visible surface.
     pub(super) nearest: bool,
-    pub(super) is_from_camera: bool,
+    /// For a camera ray, what decides about the surfaces that cover it.
+    pub(super) from_camera: Option<[f32; 2]>,
     /// The shapes to show, hit or not; `None` for those that the ray hits, or else those that it passes nearest.
     pub(super) shapes: Option<&'a Chosen>,
     /// What is up in the world.
@@ -70,7 +71,10 @@ pub(super) fn surfaces(
         Some(Chosen::All) | None => true,
     };
     let mut section = Section::new("surfaces", texts.surfaces);
-    let first = if wanted.is_from_camera { resolved.closest_seen(ray) } else { resolved.closest(ray) };
+    let first = match wanted.from_camera {
+        Some(numbers) => resolved.closest_seen(ray, numbers),
+        None => resolved.closest(ray),
+    };
     let mut hits: Vec<Hit> = Vec::new();
     let mut are_more = false;
     if wanted.nearest && wanted.shapes.is_none() {
@@ -90,7 +94,7 @@ pub(super) fn surfaces(
     let met: BTreeSet<u32> = hits.iter().map(|hit| resolved.shape_index(hit)).collect();
     let most = match wanted.shapes {
         Some(_) => MAX_HITS,
-        None if hits.is_empty() && wanted.is_from_camera => MAX_MISSES,
+        None if hits.is_empty() && wanted.from_camera.is_some() => MAX_MISSES,
         None => 0,
     };
     let missed = match most {

@@ -17,7 +17,7 @@ pub struct Sampler {
 
 /// The position in the pixel, the time of a ray, and its wavelengths.
 const FILTER: u32 = 0;
-/// The position on the lens.
+/// The position on the lens, and what the first two surfaces cover.
 const LENS: u32 = 1;
 /// Path vertex k has the labels `FIRST_VERTEX + 2 * k` for its light, and the next one for its BSDF.
 const FIRST_VERTEX: u32 = 2;
@@ -201,6 +201,12 @@ impl SampleNumbers {
     /// The position on the lens.
     pub fn lens(&self) -> DVec2 {
         self.two(LENS)
+    }
+
+    /// Decides which of the surfaces that cover a camera ray it meets: see [`lumbre_scene::Scene::closest_seen`].
+    pub fn coverage(&self) -> [f32; 2] {
+        let [.., first, second] = self.four(LENS);
+        [first, second]
     }
 
     /// The choice of the light at a vertex: a multiple of 2⁻⁴⁸.

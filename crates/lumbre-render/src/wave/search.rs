@@ -70,7 +70,8 @@ impl Hits {
             self.rays.extend((0..len).map(|path| paths.ray(path, time(path))));
             self.double.resize(len, None);
             if is_seen {
-                scene.closest_seen_batch(&self.rays, &mut self.double[..len]);
+                let numbers = |path: usize| slots.numbers(paths.slot[path] as usize).coverage();
+                scene.closest_seen_batch(&self.rays, numbers, &mut self.double[..len]);
             } else {
                 scene.closest_batch(&self.rays, &mut self.double[..len]);
             }
@@ -100,11 +101,16 @@ impl Hits {
             if id == HitColumns::MISS || !(scene.may_be_cutout(id) || is_seen && scene.may_be_one_sided(id)) {
                 continue;
             }
-            let ray = paths.ray(path, slots.time[paths.slot[path] as usize]);
+            let slot = paths.slot[path] as usize;
+            let ray = paths.ray(path, slots.time[slot]);
             let Some(hit) = self.columns.to_hit(path) else { continue };
-            if !scene.is_solid(&ray, &hit) || is_seen && scene.is_back_of_one_sided(&ray, &hit) {
-                let behind = if is_seen { scene.closest_seen(&ray) } else { scene.closest(&ray) };
-                self.behind.push((path as u32, behind));
+            if is_seen {
+                let numbers = slots.numbers(slot).coverage();
+                if scene.is_back_of_one_sided(&ray, &hit) || scene.coverage(&ray, &hit) <= numbers[0] {
+                    self.behind.push((path as u32, scene.closest_seen(&ray, numbers)));
+                }
+            } else if !scene.is_solid(&ray, &hit) {
+                self.behind.push((path as u32, scene.closest(&ray)));
             }
         }
     }
