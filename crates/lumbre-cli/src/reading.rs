@@ -212,6 +212,15 @@ impl ReadingArguments {
         self.strict
     }
 
+    /// The axis that the front of a model is taken to face, where its format says nothing of it.
+    pub(crate) fn guessed_front(&self, path: &Path, is_z_up: bool) -> Option<&'static str> {
+        match self.input_format.or(SceneFormat::from_path(path))? {
+            SceneFormat::Obj | SceneFormat::Ply => Some(if is_z_up { "-y" } else { "+z" }),
+            SceneFormat::Stl => Some("-y"),
+            _ => None,
+        }
+    }
+
     /// How to treat invalid input.
     pub(crate) fn strictness(&self) -> Strictness {
         match (self.strict, self.lenient) {

@@ -102,6 +102,11 @@ impl ViewArguments {
         Ok(())
     }
 
+    /// Whether the camera looks from where a model's front is taken to be.
+    pub(crate) fn is_from_front(&self) -> bool {
+        self.azimuth.is_none() && self.eye.is_none() && self.target.is_none() && self.up.is_none()
+    }
+
     /// Refuses a lens for a camera of the file that has none.
     ///
     /// # Errors

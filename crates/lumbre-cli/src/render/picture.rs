@@ -240,6 +240,15 @@ impl<'a> Built<'a> {
         if prepared.staged().guessed_up && is_first && !arguments.quiet {
             say!("{name}: z is up, since the model stands on a plane of z (--up y makes y up)");
         }
+        let asks_for_front =
+            prepared.staged().framed && arguments.view.is_from_front() && self.frame.is_none();
+        if let Some(front) =
+            arguments.reading.guessed_front(&arguments.scene[0], prepared.staged().guessed_up)
+            && asks_for_front
+            && !arguments.quiet
+        {
+            say!("{name}: its front is taken to face {front} (--azimuth 180 shows it from behind)");
+        }
         if !options.spectral && is_first && is_of_light && scene.resolved().disperses() {
             warn(
                 "glass does not disperse light without --spectral: its index at 587.6 nm is used for all colours",
