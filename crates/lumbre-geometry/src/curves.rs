@@ -6,6 +6,7 @@ use std::fmt;
 use lumbre_math::rounding::gamma;
 use lumbre_math::{DVec2, DVec3, Elementary, Vec3};
 
+use crate::curve_chords::{CHORDS, may_touch, passes_line};
 use crate::shape::check;
 use crate::{Aabb, Ray, Root, Roots, ShapeError, Strand, Surface};
 
@@ -55,6 +56,8 @@ struct Segment {
     first: u32,
     /// At both ends.
     widths: [f32; 2],
+    /// Everything of it is this near to the line through its ends, or nearer.
+    reach: f32,
 }
 
 /// Relative to the ray: x and y across, z along its unit direction.
@@ -100,7 +103,9 @@ impl Curves {
         self.points.extend(strand.points().iter().map(|&p| relative(p)));
         for (i, widths) in strand.widths().windows(2).enumerate() {
             let widths = [widths[0] as f32, widths[1] as f32];
-            self.segments.push(Segment { first: first + 3 * i as u32, widths });
+            let first = first + 3 * i as u32;
+            let reach = reach_of(&self.points[first as usize..], widths);
+            self.segments.push(Segment { first, widths, reach });
         }
         if is_ribbon {
             self.normals.extend(strand.normals().windows(2).map(|n| [n[0].as_vec3(), n[1].as_vec3()]));
@@ -307,6 +312,24 @@ impl Curves {
         }
     }
 
+    /// Whether a ray may touch a primitive: a quick test that is never false where it does.
+    fn may_touch(&self, primitive: u32, ray: &Ray) -> bool {
+        let segment = self.segment(primitive);
+        let offset = ray.origin - self.origin;
+        let direction = ray.direction.as_vec3();
+        let points = &self.points[segment.first as usize..][..4];
+        let relative = |p: Vec3| (p.as_dvec3() - offset).as_vec3();
+        if passes_line(relative(points[0]), points[3] - points[0], direction, segment.reach) {
+            return false;
+        }
+        let points = std::array::from_fn(|i| relative(points[i]));
+        // The parts of the parameter that the primitive is: one or more chords, or a share of one.
+        let place = primitive as usize & ((1 << self.splits) - 1);
+        let first = place * CHORDS >> self.splits;
+        let end = ((place + 1) * CHORDS).div_ceil(1 << self.splits);
+        may_touch(points, direction, segment.widths, first..end)
+    }
+
     fn segment(&self, primitive: u32) -> &Segment {
         &self.segments[(primitive >> self.splits) as usize]
     }
@@ -338,6 +361,20 @@ impl Curves {
 fn width_at(segment: &Segment, u: f64) -> f64 {
     let [w0, w1] = segment.widths.map(f64::from);
     w0 + u * (w1 - w0)
+}
+
+/// How far the points of a segment of these control points and widths are from the line through its ends, or a little
+/// more.
+fn reach_of(points: &[Vec3], [w0, w1]: [f32; 2]) -> f32 {
+    let way = |i: usize| (points[i] - points[0]).as_dvec3();
+    let chord = way(3);
+    let distance = |i: usize| match chord.try_normalize() {
+        Some(along) => way(i).reject_from_normalized(along).length(),
+        None => way(i).length(),
+    };
+    let reach = distance(1).max(distance(2)) as f32 + 0.5 * w0.max(w1);
+    // More than the rounding of all steps.
+    reach * (1.0 + 1e-5)
 }
 
 /// A cubic at a parameter, with its first and second derivative.
@@ -385,7 +422,11 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
+    /// `None` where the ray certainly misses the primitive.
     fn new(curves: &'a Curves, primitive: u32, ray: &'a Ray) -> Option<Self> {
+        if !curves.may_touch(primitive, ray) {
+            return None;
+        }
         // A direction may be of any length that is a number.
         let largest = ray.direction.abs().max_element();
         let z = (ray.direction / largest).try_normalize()?;

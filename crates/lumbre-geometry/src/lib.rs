@@ -7,6 +7,7 @@
 mod aabb;
 mod axial;
 mod bounding_volume;
+mod curve_chords;
 mod curves;
 mod density;
 mod explain;
