@@ -4,7 +4,6 @@
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 use std::fs;
-use std::path::Path;
 use std::sync::Mutex;
 
 use crate::files::Folder;
@@ -12,20 +11,16 @@ use crate::files::Folder;
 #[path = "malformed_files.rs"]
 mod malformed_files;
 
-use malformed_files::{Case, HEAD, every_case};
+use malformed_files::{Case, common_files, every_case};
 
 #[test]
 fn every_malformed_file_gets_its_message() {
     let folder = Folder::new();
-    folder.write("good.pbrt", &format!("{HEAD}Shape \"sphere\"\n"));
-    folder.write("a.txt", "text\n");
-    folder.write("b.txt", "text\n");
+    for (name, bytes) in common_files() {
+        fs::write(folder.path(name), bytes).unwrap();
+    }
     let all = every_case();
     assert!(all.len() >= 400, "{}", all.len());
-    for name in ["cloud.nvdb", "satin.bsdf"] {
-        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/pictures/images").join(name);
-        fs::copy(from, folder.path(name)).unwrap();
-    }
     // Several cases name the same file, and are read at the same time.
     for (name, bytes) in all.iter().flat_map(|case| &case.files) {
         fs::write(folder.path(name), bytes).unwrap();

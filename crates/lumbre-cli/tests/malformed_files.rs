@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 /// The beginning of most scenes.
-pub(crate) const HEAD: &str = "Film \"rgb\" \"integer xresolution\" 4 \"integer yresolution\" 3\n\
+const HEAD: &str = "Film \"rgb\" \"integer xresolution\" 4 \"integer yresolution\" 3\n\
                     Sampler \"sobol\" \"integer pixelsamples\" 1\nLookAt 0 -8 3 0 0 0 0 0 1\nCamera \"perspective\"\n\
                     WorldBegin\nLightSource \"infinite\"\n";
 
@@ -82,14 +82,29 @@ fn unescaped(text: &str) -> Vec<u8> {
     bytes
 }
 
+/// A file of the book's pictures.
+fn source(name: &str) -> Vec<u8> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/pictures/images");
+    fs::read(folder.join(name)).unwrap()
+}
+
+/// The files that any case may name, besides its own.
+pub(crate) fn common_files() -> Vec<(&'static str, Vec<u8>)> {
+    let text = |name| (name, b"text\n".to_vec());
+    let of_book = |name| (name, source(name));
+    vec![
+        ("good.pbrt", format!("{HEAD}Shape \"sphere\"\n").into_bytes()),
+        text("a.txt"),
+        text("b.txt"),
+        of_book("cloud.nvdb"),
+        of_book("satin.bsdf"),
+    ]
+}
+
 /// The files of the lines in front that make some, and the rest of the body: `@FILE NAME text`, with `\n` between
-/// lines; `@CUT NAME COUNT of SOURCE`, the first bytes of a picture's file; `@PUT NAME HEX at OFFSET of SOURCE`, with some
-/// bytes replaced.
+/// lines; `@CUT NAME COUNT of SOURCE`, the first bytes of a picture's file; `@PUT NAME HEX at OFFSET of SOURCE`, with
+/// some bytes replaced.
 fn files_of(body: &str) -> (Vec<(String, Vec<u8>)>, String) {
-    let source = |name: &str| {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/pictures/images");
-        fs::read(folder.join(name)).unwrap()
-    };
     let mut files = Vec::new();
     let mut rest = body;
     while let Some((line, after)) = rest.split_once('\n') {

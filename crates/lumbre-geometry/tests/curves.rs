@@ -28,7 +28,8 @@ fn wander(random: &mut RandomStream, points: usize, widths: [f64; 2]) -> Strand 
 fn of(kind: CurveKind, strands: &[Strand]) -> Curves {
     let mut curves = Curves::new(kind);
     strands.iter().for_each(|strand| curves.push(strand).expect("it is near"));
-    curves
+    // A segment is a primitive.
+    curves.with_splits(0)
 }
 
 /// A ray past some place of a strand, about as near as it is wide.

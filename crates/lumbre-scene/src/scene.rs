@@ -299,8 +299,8 @@ impl Scene {
 
     /// The closest hit visible to a camera: as [`Scene::closest`], also skipping the backs of one-sided
     /// materials. Each of the two nearest surfaces that cover the ray is hit if its coverage is above its number, in
-    /// [0, 1): numbers that are stratified over the rays of a pixel leave little noise in its alpha. A hash decides about
-    /// surfaces behind.
+    /// [0, 1): numbers that are stratified over the rays of a pixel leave little noise in its alpha. A hash decides
+    /// about surfaces behind.
     pub fn closest_seen(&self, ray: &Ray, numbers: [f32; 2]) -> Option<Hit> {
         if !self.traits.has_one_sided && !self.traits.has_cutouts {
             return self.accel.closest(ray);
