@@ -117,6 +117,16 @@ fn loops_and_choices_go_where_they_should() {
 }
 
 #[test]
+fn branches_that_are_passed_over_say_and_declare_nothing() {
+    let text = "#if (0) #macro M(A) #if (A) #error \"no\" #end #end #elseif (0) #declare B = 1;
+        #else #declare C = 3; #end
+        #switch (2) #case (1) #declare B = 1; #break #case (2) #declare C = C + 4; #end
+        #while (0) #for (I, 1, 3) #declare B = 2; #end #end
+        #write(F, str(C, 0, 0), \" \", defined(B), \" \", defined(M))";
+    assert_eq!(written(text), "7 0 0");
+}
+
+#[test]
 fn what_a_scene_writes_it_can_read() {
     let text = "#fopen G \"g\" write #write(G, 1.5, \",\", <1, -2, 3>, \",\\\"text\\\"\") #fclose G
         #fopen G \"g\" read #read(G, A, B, C) #write(F, A, B, C) #ifdef (G) #write(F, \"no\") #end";

@@ -1,12 +1,11 @@
 //! Directives: what begins with `#`.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::lexer::Kind;
 use super::source::{Block, BlockKind, Frame, Macro};
-use super::value::{Array, Cell, Num, Value};
+use super::value::{Array, Cell, Names, Num, Value};
 use super::words::is_reserved;
 use super::{Parser, Result};
 use crate::Diagnostic;
@@ -26,7 +25,7 @@ impl Parser<'_, '_> {
             self.warn("a # without the word of a directive is left out");
             return Ok(());
         }
-        let Some(Kind::Word(word)) = self.raw()?.map(|token| token.kind) else { return Ok(()) };
+        let Some(Kind::Word(word)) = self.raw()? else { return Ok(()) };
         match &*word {
             "declare" | "local" => self.declare(&*word == "local"),
             "undef" => self.undef(),
@@ -107,8 +106,8 @@ impl Parser<'_, '_> {
 
     /// Whether the name that comes next, or an element of the array of that name, is defined.
     pub(super) fn is_defined(&mut self) -> Result<bool> {
-        let Some(token) = self.raw()? else { return Err(self.error("a name is missing")) };
-        let Kind::Word(name) = token.kind else { return Err(self.error("a name is missing")) };
+        let Some(kind) = self.raw()? else { return Err(self.error("a name is missing")) };
+        let Kind::Word(name) = kind else { return Err(self.error("a name is missing")) };
         let value = self.lookup(&name).map(|cell| cell.borrow().clone());
         let value = match value {
             Some(Value::Array(array)) if self.is_mark(b'[')? => self.element(&array)?,
@@ -175,12 +174,11 @@ impl Parser<'_, '_> {
     fn skip(&mut self, stops_at_branches: bool) -> Result<Rc<str>> {
         let mut depth = 0_u32;
         loop {
-            let Some(token) = self.raw()? else { return Err(self.error("a directive without its #end")) };
-            if token.kind != Kind::Mark(b'#') {
-                continue;
+            if !self.skip_to_directive()? {
+                return Err(self.error("a directive without its #end"));
             }
-            let Some(token) = self.raw()? else { continue };
-            let Kind::Word(word) = token.kind else { continue };
+            let Some(kind) = self.raw()? else { continue };
+            let Kind::Word(word) = kind else { continue };
             match &*word {
                 "if" | "ifdef" | "ifndef" | "while" | "for" | "switch" | "macro" => depth += 1,
                 "end" if depth > 0 => depth -= 1,
@@ -236,8 +234,8 @@ impl Parser<'_, '_> {
 
     fn begin_for(&mut self, at: usize) -> Result<()> {
         self.expect(b'(')?;
-        let Some(token) = self.raw()? else { return Err(self.error("the variable of #for is missing")) };
-        let Kind::Word(name) = token.kind else {
+        let Some(kind) = self.raw()? else { return Err(self.error("the variable of #for is missing")) };
+        let Kind::Word(name) = kind else {
             return Err(self.error("the variable of #for is missing"));
         };
         if is_reserved(&name) {
@@ -318,19 +316,19 @@ impl Parser<'_, '_> {
     }
 
     fn define_macro(&mut self) -> Result<()> {
-        let Some(token) = self.raw()? else { return Err(self.error("the name of a macro is missing")) };
-        let Kind::Word(name) = token.kind else { return Err(self.error("the name of a macro is missing")) };
+        let Some(kind) = self.raw()? else { return Err(self.error("the name of a macro is missing")) };
+        let Kind::Word(name) = kind else { return Err(self.error("the name of a macro is missing")) };
         if is_reserved(&name) {
             return Err(self.reserved(&name));
         }
         let mut parameters = Vec::new();
         let wrong = |parser: &Self| parser.error("the parameters of a macro are names in parentheses");
-        if self.raw()?.map(|token| token.kind) != Some(Kind::Mark(b'(')) {
+        if self.raw()? != Some(Kind::Mark(b'(')) {
             return Err(wrong(self));
         }
         let mut is_optional = false;
         loop {
-            match self.raw()?.map(|token| token.kind) {
+            match self.raw()? {
                 Some(Kind::Mark(b')')) => break,
                 Some(Kind::Mark(b',')) => {}
                 Some(Kind::Word(word)) if &*word == "optional" => is_optional = true,
@@ -357,7 +355,7 @@ impl Parser<'_, '_> {
             return Err(self.error(format!("the macro {} is called without its arguments", called.name)));
         }
         self.raw()?;
-        let mut locals: HashMap<Rc<str>, Cell> = HashMap::with_capacity(called.parameters.len());
+        let mut locals = Names::with_capacity_and_hasher(called.parameters.len(), rustc_hash::FxBuildHasher);
         for (i, (parameter, is_optional)) in called.parameters.iter().enumerate() {
             if i > 0 && !*is_optional {
                 self.comma()?;
@@ -398,7 +396,7 @@ impl Parser<'_, '_> {
     }
 
     fn is_closing(&self) -> bool {
-        self.peeked.as_ref().is_some_and(|token| token.kind == Kind::Mark(b')'))
+        self.peeked.as_ref().is_some_and(|kind| *kind == Kind::Mark(b')'))
     }
 
     /// The identifier that an argument is, where it is nothing but a name.
@@ -429,7 +427,7 @@ impl Parser<'_, '_> {
     }
 
     fn declared_name(&mut self) -> Result<Rc<str>> {
-        match self.raw()?.map(|token| token.kind) {
+        match self.raw()? {
             Some(Kind::Word(name)) => Ok(name),
             _ => Err(self.error("the name of an identifier is missing")),
         }
@@ -456,7 +454,7 @@ impl Parser<'_, '_> {
         if self.raw_ahead(0) == Some(&Kind::Mark(b'(')) {
             return Err(self.error("functions are declared without parentheses behind their name"));
         }
-        if self.raw()?.map(|token| token.kind) != Some(Kind::Mark(b'=')) {
+        if self.raw()? != Some(Kind::Mark(b'=')) {
             return Err(self.error("an = is missing"));
         }
         if let Some(cell) = self.lookup(&name)
@@ -491,7 +489,7 @@ impl Parser<'_, '_> {
             return Err(self.error("what has an index is no array"));
         };
         let index = self.index(&array)?;
-        if self.raw()?.map(|token| token.kind) != Some(Kind::Mark(b'=')) {
+        if self.raw()? != Some(Kind::Mark(b'=')) {
             return Err(self.error("an = is missing"));
         }
         drop(array);
@@ -533,8 +531,8 @@ impl Parser<'_, '_> {
     }
 
     fn undef(&mut self) -> Result<()> {
-        let Some(token) = self.raw()? else { return Ok(()) };
-        let Kind::Word(name) = token.kind else { return Err(self.error("a name is missing")) };
+        let Some(kind) = self.raw()? else { return Ok(()) };
+        let Kind::Word(name) = kind else { return Err(self.error("a name is missing")) };
         for frame in self.frames.iter_mut().rev() {
             if frame.locals.remove(&name).is_some() {
                 return Ok(());

@@ -498,14 +498,14 @@ impl Parser<'_, '_> {
                 match &*word {
                     "concat" | "chr" | "str" | "strlwr" | "strupr" | "substr" | "vstr" | "datetime"
                     | "input_file_name" => true,
-                    _ => match self.lookup(&word).map(|cell| cell.borrow().clone()) {
-                        Some(Value::Text(_)) => true,
-                        Some(Value::Array(array)) => {
+                    _ => self.lookup(&word).is_some_and(|cell| match &*cell.borrow() {
+                        Value::Text(_) => true,
+                        Value::Array(array) => {
                             matches!(array.elements.first(), Some(Value::Text(_)))
                                 && self.raw_ahead(0) == Some(&Kind::Mark(b'['))
                         }
                         _ => false,
-                    },
+                    }),
                 }
             }
             _ => false,

@@ -13,8 +13,8 @@ use crate::input::lossy_text;
 
 impl Parser<'_, '_> {
     pub(super) fn open_file(&mut self) -> Result<()> {
-        let Some(token) = self.raw()? else { return Err(self.error("the name of a file is missing")) };
-        let Kind::Word(handle) = token.kind else { return Err(self.error("the name of a file is missing")) };
+        let Some(kind) = self.raw()? else { return Err(self.error("the name of a file is missing")) };
+        let Kind::Word(handle) = kind else { return Err(self.error("the name of a file is missing")) };
         let name = self.file_name()?;
         let Some(mode) = self.word()? else { return Err(self.unexpected("read, write or append")) };
         self.peeked = None;
@@ -52,12 +52,12 @@ impl Parser<'_, '_> {
             lossy_text(&crate::Input::open(&path, self.budget)?).into_owned()
         };
         self.budget.bytes(40 * text.len() as u64, "files that a scene reads")?;
-        Ok(tokens(&text).collect())
+        Ok(tokens(&text, &mut self.words).collect())
     }
 
     fn handle(&mut self) -> Result<Rc<RefCell<File>>> {
-        let Some(token) = self.raw()? else { return Err(self.error("the name of a file is missing")) };
-        let Kind::Word(handle) = token.kind else { return Err(self.error("the name of a file is missing")) };
+        let Some(kind) = self.raw()? else { return Err(self.error("the name of a file is missing")) };
+        let Kind::Word(handle) = kind else { return Err(self.error("the name of a file is missing")) };
         match self.lookup(&handle).map(|cell| cell.borrow().clone()) {
             Some(Value::File(file)) => Ok(file),
             _ => Err(self.error("the file is not open")),

@@ -2,6 +2,10 @@
 
 use std::rc::Rc;
 
+use rustc_hash::FxHashMap;
+
+use super::words::is_reserved;
+
 /// A token.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Kind {
@@ -21,8 +25,25 @@ pub(super) enum Kind {
 #[derive(Clone, Debug)]
 pub(super) struct Token {
     pub kind: Kind,
+    /// Whether it is a word of the language, which no scene may declare.
+    pub is_reserved: bool,
     pub line: u32,
     pub column: u32,
+}
+
+/// The words of all files of a scene, each kept once, with whether it belongs to the language.
+#[derive(Debug, Default)]
+pub(super) struct Words(FxHashMap<Rc<str>, bool>);
+
+impl Words {
+    fn name(&mut self, text: &str) -> (Rc<str>, bool) {
+        if let Some((name, is_reserved)) = self.0.get_key_value(text) {
+            return (Rc::clone(name), *is_reserved);
+        }
+        let (name, is_reserved) = (Rc::from(text), is_reserved(text));
+        self.0.insert(Rc::clone(&name), is_reserved);
+        (name, is_reserved)
+    }
 }
 
 pub(super) const LESS_OR_EQUAL: u8 = b'l';
@@ -31,6 +52,7 @@ pub(super) const NOT_EQUAL: u8 = b'n';
 
 /// A text that is being cut.
 struct Cutter<'a> {
+    words: &'a mut Words,
     text: &'a [u8],
     at: usize,
     line: u32,
@@ -38,8 +60,8 @@ struct Cutter<'a> {
 }
 
 /// The tokens of a text, in order. What is no token is one that says so, for it may stand where nobody looks.
-pub(super) fn tokens(text: &str) -> impl Iterator<Item = Token> {
-    let mut cutter = Cutter { text: text.as_bytes(), at: 0, line: 1, column: 1 };
+pub(super) fn tokens<'a>(text: &'a str, words: &'a mut Words) -> impl Iterator<Item = Token> + 'a {
+    let mut cutter = Cutter { words, text: text.as_bytes(), at: 0, line: 1, column: 1 };
     std::iter::from_fn(move || cutter.next())
 }
 
@@ -103,25 +125,32 @@ impl Cutter<'_> {
     fn next(&mut self) -> Option<Token> {
         let (line, column) = (self.line, self.column);
         if !self.skip() {
-            return Some(Token { kind: Kind::Bad("a comment without an end"), line, column });
+            let kind = Kind::Bad("a comment without an end");
+            return Some(Token { kind, is_reserved: false, line, column });
         }
         if self.at >= self.text.len() {
             return None;
         }
         let (line, column) = (self.line, self.column);
-        let kind = self.token();
-        Some(Token { kind, line, column })
+        if matches!(self.peek(0), b'a'..=b'z' | b'A'..=b'Z' | b'_') {
+            let (name, is_reserved) = self.word();
+            return Some(Token { kind: Kind::Word(name), is_reserved, line, column });
+        }
+        Some(Token { kind: self.token(), is_reserved: false, line, column })
+    }
+
+    fn word(&mut self) -> (Rc<str>, bool) {
+        let start = self.at;
+        while self.peek(0).is_ascii_alphanumeric() || self.peek(0) == b'_' {
+            self.at += 1;
+            self.column += 1;
+        }
+        let text = std::str::from_utf8(&self.text[start..self.at]).unwrap_or_default();
+        self.words.name(text)
     }
 
     fn token(&mut self) -> Kind {
-        let start = self.at;
         match self.peek(0) {
-            b'a'..=b'z' | b'A'..=b'Z' | b'_' => {
-                while self.peek(0).is_ascii_alphanumeric() || self.peek(0) == b'_' {
-                    self.bump();
-                }
-                Kind::Word(self.slice(start))
-            }
             b'0'..=b'9' => self.number(),
             b'.' if self.peek(1).is_ascii_digit() => self.number(),
             b'"' => self.quoted(),

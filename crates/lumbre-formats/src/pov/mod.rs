@@ -49,12 +49,12 @@ use lumbre_shading::pov::Media;
 
 use crate::{Budget, Diagnostic, Diagnostics, FormatError, Input};
 use camera::CameraStatement;
-use lexer::{Kind, Token};
+use lexer::{Kind, Words};
 use objects::Object;
 use settings::{Fog, Settings, SkySphere};
 use source::{Frame, Source};
 use textures::Defaults;
-use value::{Array, Cell, Value};
+use value::{Array, Names, Value};
 
 pub use job::PovJob;
 
@@ -148,10 +148,11 @@ struct Parser<'a, 'b> {
     library: Vec<PathBuf>,
     frames: Vec<Frame>,
     least_frames: usize,
-    globals: HashMap<Rc<str>, Cell>,
+    globals: Names,
     macro_count: usize,
     sources: HashMap<PathBuf, Rc<Source>>,
-    peeked: Option<Token>,
+    words: Words,
+    peeked: Option<Kind>,
     /// Where the last token stands.
     here: (Rc<str>, u32, u32),
     steps: u64,
@@ -207,6 +208,7 @@ impl<'a, 'b> Parser<'a, 'b> {
             globals: globals.collect(),
             macro_count: 0,
             sources: HashMap::new(),
+            words: Words::default(),
             peeked: None,
             here: ("".into(), 1, 1),
             steps: 0,

@@ -1,11 +1,10 @@
 //! Where tokens come from: files, the bodies of macros and loops, and what directives choose of them.
 
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use super::lexer::{Kind, Token, tokens};
-use super::value::{Cell, Value};
+use super::value::{Cell, Names, Value};
 use super::{Parser, Result};
 use crate::budget::LimitError;
 use crate::input::lossy_text;
@@ -36,7 +35,7 @@ pub(super) struct Frame {
     pub end: usize,
     /// The macro whose body this is; `None` for a file.
     pub of_macro: Option<Rc<str>>,
-    pub locals: HashMap<Rc<str>, Cell>,
+    pub locals: Names,
     pub blocks: Vec<Block>,
     /// The version of the scene before this file.
     pub version: f64,
@@ -86,11 +85,15 @@ impl Parser<'_, '_> {
     pub(super) fn cut(&mut self, text: &str, name: &str) -> Result<Rc<Source>> {
         let mut list = Vec::new();
         let mut hold = self.budget.hold_nothing();
-        for token in tokens(text.strip_prefix('\u{FEFF}').unwrap_or(text)) {
+        for token in tokens(text.strip_prefix('\u{FEFF}').unwrap_or(text), &mut self.words) {
             hold.room_in(&mut list, "tokens of a scene")?;
-            if let Kind::Word(text) | Kind::Text(text) = &token.kind {
-                hold.grow(text.len() as u64 + 16, "tokens of a scene")?;
-            }
+            // A name that is held by this token and the table alone is new.
+            let kept = match &token.kind {
+                Kind::Word(name) if Rc::strong_count(name) <= 2 => name.len() as u64 + 64,
+                Kind::Text(text) => text.len() as u64 + 16,
+                _ => 0,
+            };
+            hold.grow(kept, "tokens of a scene")?;
             list.push(token);
         }
         hold.keep();
@@ -107,7 +110,7 @@ impl Parser<'_, '_> {
             at: 0,
             end,
             of_macro: None,
-            locals: HashMap::new(),
+            locals: Names::default(),
             blocks: Vec::new(),
             version,
         });
@@ -129,20 +132,34 @@ impl Parser<'_, '_> {
         folders.map(|folder| folder.join(name)).find(|path| self.budget.is_file(path))
     }
 
-    /// The next token as it stands, without directives; `None` at the end of a frame.
-    pub(super) fn raw(&mut self) -> Result<Option<Token>> {
+    /// Goes past the next token as it stands, without directives; `false` at the end of a frame.
+    fn advance(&mut self) -> Result<bool> {
         self.step()?;
-        let Some(frame) = self.frames.last_mut() else { return Ok(None) };
+        let Some(frame) = self.frames.last_mut() else { return Ok(false) };
         if frame.at >= frame.end {
-            return Ok(None);
+            return Ok(false);
         }
-        let token = frame.source.tokens[frame.at].clone();
+        let token = &frame.source.tokens[frame.at];
         frame.at += 1;
-        self.here = (Rc::clone(&frame.source.name), token.line, token.column);
+        if !Rc::ptr_eq(&self.here.0, &frame.source.name) {
+            self.here.0 = Rc::clone(&frame.source.name);
+        }
+        (self.here.1, self.here.2) = (token.line, token.column);
         if let Kind::Bad(what) = token.kind {
             return Err(self.error(what));
         }
-        Ok(Some(token))
+        Ok(true)
+    }
+
+    /// The token that was gone past last.
+    fn passed(&self) -> Option<&Token> {
+        let frame = self.frames.last()?;
+        frame.source.tokens.get(frame.at.checked_sub(1)?)
+    }
+
+    /// The next token as it stands, without directives; `None` at the end of a frame.
+    pub(super) fn raw(&mut self) -> Result<Option<Kind>> {
+        Ok(if self.advance()? { self.passed().map(|token| token.kind.clone()) } else { None })
     }
 
     /// The token this far behind the next one, unexpanded, in the same frame.
@@ -152,13 +169,27 @@ impl Parser<'_, '_> {
         (at < frame.end).then(|| &frame.source.tokens[at].kind)
     }
 
+    /// Passes all tokens up to the next `#`, and takes that; `false` at the end of a frame.
+    pub(super) fn skip_to_directive(&mut self) -> Result<bool> {
+        let Some(frame) = self.frames.last_mut() else { return Ok(false) };
+        let rest = &frame.source.tokens[frame.at..frame.end];
+        let passed = rest.iter().position(|token| matches!(token.kind, Kind::Mark(b'#') | Kind::Bad(_)));
+        let passed = passed.unwrap_or(rest.len());
+        frame.at += passed;
+        self.steps += passed as u64;
+        self.advance()
+    }
+
     /// Counts a step of reading.
     fn step(&mut self) -> Result<()> {
         self.steps += 1;
         let most = self.budget.limits().elements.clamp(STEPS.0, STEPS.1);
-        if self.steps <= most {
-            return Ok(());
-        }
+        if self.steps <= most { Ok(()) } else { Err(self.endless(most)) }
+    }
+
+    /// The error of a scene that has taken more steps than it may.
+    #[cold]
+    fn endless(&self, most: u64) -> FormatError {
         // The loop that went round most often is the one that does not end.
         let busiest =
             self.frames.iter().flat_map(|frame| frame.blocks.iter().map(move |block| (frame, block)));
@@ -180,30 +211,31 @@ impl Parser<'_, '_> {
             Some((_, block)) => format!("a loop that has not ended after {} rounds", block.rounds),
             None => "a scene that does not end".to_owned(),
         };
-        Err(Diagnostic::error(message).at(place).found(limit).into())
+        Diagnostic::error(message).at(place).found(limit).into()
     }
 
     /// The next token that is no directive and no call of a macro; `None` at the end of the scene.
-    pub(super) fn fetch(&mut self) -> Result<Option<Token>> {
+    pub(super) fn fetch(&mut self) -> Result<Option<Kind>> {
         loop {
-            let Some(token) = self.raw()? else {
+            if !self.advance()? {
                 if self.leave_frame()? {
                     continue;
                 }
                 return Ok(None);
-            };
+            }
+            let Some(token) = self.passed() else { return Ok(None) };
             match &token.kind {
                 Kind::Mark(b'#') => {
                     self.directive()?;
-                    if let Some(token) = self.peeked.take() {
-                        return Ok(Some(token));
+                    if let Some(kind) = self.peeked.take() {
+                        return Ok(Some(kind));
                     }
                 }
-                Kind::Word(name) => match self.lookup_macro(name) {
+                Kind::Word(name) if !token.is_reserved => match self.lookup_macro(name) {
                     Some(called) => self.call(&called)?,
-                    None => return Ok(Some(token)),
+                    None => return Ok(Some(Kind::Word(Rc::clone(name)))),
                 },
-                _ => return Ok(Some(token)),
+                kind => return Ok(Some(kind.clone())),
             }
         }
     }
@@ -244,16 +276,16 @@ impl Parser<'_, '_> {
         if self.peeked.is_none() {
             self.peeked = self.fetch()?;
         }
-        Ok(self.peeked.as_ref().map(|token| &token.kind))
+        Ok(self.peeked.as_ref())
     }
 
     /// The next token.
     pub(super) fn next(&mut self) -> Result<Kind> {
-        let token = match self.peeked.take() {
-            Some(token) => Some(token),
+        let kind = match self.peeked.take() {
+            Some(kind) => Some(kind),
             None => self.fetch()?,
         };
-        token.map(|token| token.kind).ok_or_else(|| self.error("the scene ends here"))
+        kind.ok_or_else(|| self.error("the scene ends here"))
     }
 
     /// Whether a mark comes next.

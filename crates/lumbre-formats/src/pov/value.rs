@@ -140,6 +140,9 @@ impl Value {
 /// An identifier's place: shared where a macro's parameter stands for the caller's identifier.
 pub(super) type Cell = Rc<RefCell<Value>>;
 
+/// Identifiers by their names.
+pub(super) type Names = rustc_hash::FxHashMap<Rc<str>, Cell>;
+
 /// An array of up to five dimensions.
 #[derive(Clone, Debug)]
 pub(super) struct Array {
