@@ -355,7 +355,7 @@ impl Parser<'_, '_> {
             return Err(self.error(format!("the macro {} is called without its arguments", called.name)));
         }
         self.raw()?;
-        let mut locals = Names::with_capacity_and_hasher(called.parameters.len(), rustc_hash::FxBuildHasher);
+        let mut locals = Names::with_capacity(called.parameters.len());
         for (i, (parameter, is_optional)) in called.parameters.iter().enumerate() {
             if i > 0 && !*is_optional {
                 self.comma()?;

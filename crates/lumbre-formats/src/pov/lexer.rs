@@ -1,8 +1,7 @@
 //! Text of POV-Ray's scene language as tokens with their places.
 
+use std::collections::HashMap;
 use std::rc::Rc;
-
-use rustc_hash::FxHashMap;
 
 use super::words::is_reserved;
 
@@ -33,7 +32,7 @@ pub(super) struct Token {
 
 /// The words of all files of a scene, each kept once, with whether it belongs to the language.
 #[derive(Debug, Default)]
-pub(super) struct Words(FxHashMap<Rc<str>, bool>);
+pub(super) struct Words(HashMap<Rc<str>, bool>);
 
 impl Words {
     fn name(&mut self, text: &str) -> (Rc<str>, bool) {

@@ -141,7 +141,7 @@ impl Value {
 pub(super) type Cell = Rc<RefCell<Value>>;
 
 /// Identifiers by their names.
-pub(super) type Names = rustc_hash::FxHashMap<Rc<str>, Cell>;
+pub(super) type Names = HashMap<Rc<str>, Cell>;
 
 /// An array of up to five dimensions.
 #[derive(Clone, Debug)]

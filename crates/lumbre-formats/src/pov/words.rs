@@ -40,9 +40,9 @@ water_level waves while width wood wrinkles write x y yes z";
 
 /// Whether a word belongs to the language.
 pub(super) fn is_reserved(word: &str) -> bool {
-    use rustc_hash::FxHashSet;
+    use std::collections::HashSet;
     use std::sync::LazyLock;
-    static WORDS: LazyLock<FxHashSet<&'static str>> =
+    static WORDS: LazyLock<HashSet<&'static str>> =
         LazyLock::new(|| RESERVED.split_ascii_whitespace().collect());
     WORDS.contains(word)
 }
