@@ -326,7 +326,7 @@ impl Curves {
         let points = std::array::from_fn(|i| relative(points[i]));
         // The parts of the parameter that the primitive is: one or more chords, or a share of one.
         let place = primitive as usize & ((1 << self.splits) - 1);
-        let first = place * CHORDS >> self.splits;
+        let first = (place * CHORDS) >> self.splits;
         let end = ((place + 1) * CHORDS).div_ceil(1 << self.splits);
         may_touch(points, direction, segment.widths, first..end)
     }
