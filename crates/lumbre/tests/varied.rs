@@ -372,3 +372,68 @@ fn glass_reflects_each_wavelength_by_its_index() {
         assert!((found / expected - 1.0).abs() < 0.05, "bucket {i}: {found}, not {expected}");
     }
 }
+
+#[test]
+fn a_prism_bends_each_wavelength_by_its_index() {
+    // Rays along z enter a wedge head-on, leave its slanted back, and see a wall that shines beyond x = 1.
+    let (wedge, wall, edge) = (15_f64.to_radians(), 8.0, 1.0);
+    let (thin, thick) = (2.0 - 5.0 * wedge.tan(), 2.0 + 5.0 * wedge.tan());
+    let text = format!(
+        "Film \"spectral\" \"integer nbuckets\" 3 \"float lambdamin\" 400 \"float lambdamax\" 700
+           \"integer xresolution\" 64 \"integer yresolution\" 4
+         PixelFilter \"box\" Integrator \"path\" \"integer maxdepth\" 2
+         LookAt 0 0 -10 0 0 0 0 1 0 Camera \"orthographic\" \"float screenwindow\" [-1 1 -1 1]
+         WorldBegin
+         AttributeBegin AreaLightSource \"diffuse\" \"spectrum L\" [300 1 900 1] \"bool twosided\" true
+         Shape \"bilinearmesh\" \"point3 P\" [{edge} -40 {wall}  40 -40 {wall}  {edge} 40 {wall}  40 40 {wall}]
+         AttributeEnd
+         Material \"dielectric\" \"spectrum eta\" [360 1.6 760 1.4]
+         Shape \"trianglemesh\" \"point3 P\" [-5 -5 0  5 -5 0  5 5 0  -5 5 0
+           -5 -5 {thin}  5 -5 {thick}  5 5 {thick}  -5 5 {thin}]
+           \"integer indices\" [0 2 1 0 3 2  4 5 6 4 6 7  0 1 5 0 5 4  2 3 7 2 7 6  0 4 7 0 7 3  1 2 6 1 6 5]"
+    );
+    let picture = rendered(&opened(&text, &[]), 512);
+    assert_eq!(picture.film().layers.len(), 3);
+    for (i, layer) in picture.film().layers.iter().enumerate() {
+        let mean_of = |columns: std::ops::Range<usize>| {
+            let rows = layer.samples.chunks(64).map(|row| row[columns.clone()].iter().sum::<f32>());
+            f64::from(rows.sum::<f32>()) / (4 * columns.len()) as f64
+        };
+        let found = mean_of(0..64) / mean_of(44..64);
+        let steps = 100;
+        let lit = |k: u32| {
+            let nm = 400.0 + 100.0 * (i as f64 + (f64::from(k) + 0.5) / f64::from(steps));
+            let index = 1.6 - 0.0005 * (nm - 360.0);
+            let bend = ((index * wedge.sin()).asin() - wedge).tan();
+            let first = (edge - (wall - 2.0) * bend) / (1.0 - wedge.tan() * bend);
+            0.5 * (1.0 - first)
+        };
+        let expected = (0..steps).map(lit).sum::<f64>() / f64::from(steps);
+        assert!((found - expected).abs() < 0.008, "bucket {i}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn integrators_of_every_name_see_the_same_light() {
+    let scene = |integrator: &str| {
+        format!(
+            "Film \"rgb\" \"integer xresolution\" 24 \"integer yresolution\" 18
+             Integrator {integrator} \"integer maxdepth\" 6
+             LookAt 0 -6 3 0 0 .5 0 0 1 Camera \"perspective\" \"float fov\" 40
+             WorldBegin
+             LightSource \"point\" \"point3 from\" [2 -2 4] \"rgb I\" [6 5 4]
+             AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [3 4 5] Translate -1 0 3 ReverseOrientation
+             Shape \"disk\" \"float radius\" .7 AttributeEnd
+             Material \"diffuse\" \"rgb reflectance\" [.6 .5 .4]
+             Shape \"bilinearmesh\" \"point3 P\" [-4 -4 0  4 -4 0  -4 4 0  4 4 0]
+             Material \"conductor\" \"float roughness\" .3 Translate 0 0 .8 Shape \"sphere\" \"float radius\" .8"
+        )
+    };
+    let expected = mean(&opened(&scene("\"path\""), &[]), 256);
+    assert!(expected.iter().all(|mean| (0.02..2.0).contains(mean)), "{expected:?}");
+    let names = ["volpath", "simplepath", "simplevolpath", "bdpt", "mlt", "sppm", "lightpath", "randomwalk"];
+    for name in names {
+        let found = mean(&opened(&scene(&format!("\"{name}\"")), &[]), 256);
+        assert_near(found, expected, 0.03, name);
+    }
+}
