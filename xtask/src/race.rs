@@ -33,7 +33,7 @@ pub(crate) struct Race {
     #[arg(long)]
     quick: bool,
     /// Only these scenes, separated by commas: cornell, interior, lights, terrain, glass, coats, models, tumbler, pool,
-    /// cloud, smoke.
+    /// cloud, smoke, hair.
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
     /// Only these programs; by default all that are found. Lumbre always takes part.
