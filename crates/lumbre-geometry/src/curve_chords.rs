@@ -35,11 +35,12 @@ const SIZES: Range<f32> = 1e-15..1e15;
 #[inline]
 pub(crate) fn passes_line(start: Vec3, chord: Vec3, direction: Vec3, reach: f32) -> bool {
     let normal = direction.cross(chord);
+    let length = normal.length();
     let [from, along, way] = [start, chord, direction].map(|v| v.abs().element_sum());
     // The cross product of nearly parallel vectors has a large relative error.
-    let limit = reach * normal.length() + ROUNDING * (from + along) * along * way;
+    let limit = reach * length + ROUNDING * (from + along) * along * way;
     // False where anything leaves the range of single precision.
-    start.dot(normal).abs() > limit && limit > SIZES.start
+    start.dot(normal).abs() > limit && length > SIZES.start
 }
 
 /// Whether a ray may come as near to a cubic Bézier curve as half the curve's width. It is never false where the ray

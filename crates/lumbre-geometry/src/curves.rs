@@ -134,7 +134,12 @@ impl Curves {
         let first = self.first_of_more(other.points.len())?;
         let segments = self.segments.len() as u32;
         self.points.extend(other.points.iter().map(relative));
-        self.segments.extend(other.segments.iter().map(|s| Segment { first: s.first + first, ..*s }));
+        for segment in &other.segments {
+            let first = segment.first + first;
+            // Anew, for the points were rounded.
+            let reach = reach_of(&self.points[first as usize..], segment.widths);
+            self.segments.push(Segment { first, reach, ..*segment });
+        }
         self.strands.extend(other.strands.iter().map(|first| first + segments));
         self.normals.extend(&other.normals);
         Ok(())

@@ -389,3 +389,27 @@ fn points_that_coincide_and_rays_along_a_curve_do_no_harm() {
         }
     }
 }
+
+#[test]
+fn curves_that_join_others_far_away_are_met_where_they_are() {
+    let mut random = RandomStream::new(31);
+    let straight = |from: DVec3, to: DVec3| {
+        let points = [0.0, 0.31, 0.64, 1.0].map(|s| from.lerp(to, s));
+        Strand::new(CurveBasis::Bezier, 3, &points, [1e-3; 2]).unwrap()
+    };
+    // Single precision moves the points by about as much as the curves are wide.
+    let mut all = of(CurveKind::Flat, &[straight(DVec3::ZERO, DVec3::X)]);
+    for i in 1..200 {
+        let from = DVec3::splat(2e4) + vector(&mut random);
+        let near = of(CurveKind::Flat, &[straight(from, from + vector(&mut random))]);
+        all.append(&near).unwrap();
+        let p = all.control_points(i);
+        let u = random.next_f64();
+        let v = 1.0 - u;
+        let on = v * v * v * p[0] + 3.0 * u * v * v * p[1] + 3.0 * u * u * v * p[2] + u * u * u * p[3];
+        // Across the curve: along it, a ray passes nearest at another place.
+        let way = (p[3] - p[0]).cross(vector(&mut random)).normalize();
+        let root = all.closest(i, &Ray::new(on - 2.0 * way, way));
+        assert!(root.is_some_and(|root| (root.t - 2.0).abs() < 1e-3), "{i}: {root:?}");
+    }
+}

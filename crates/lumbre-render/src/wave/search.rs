@@ -106,7 +106,9 @@ impl Hits {
             let Some(hit) = self.columns.to_hit(path) else { continue };
             if is_seen {
                 let numbers = slots.numbers(slot).coverage();
-                if scene.is_back_of_one_sided(&ray, &hit) || scene.coverage(&ray, &hit) <= numbers[0] {
+                let is_met =
+                    !scene.is_back_of_one_sided(&ray, &hit) && numbers[0] < scene.coverage(&ray, &hit);
+                if !is_met {
                     self.behind.push((path as u32, scene.closest_seen(&ray, numbers)));
                 }
             } else if !scene.is_solid(&ray, &hit) {
