@@ -33,7 +33,7 @@ use crate::tree::flats::Flats;
 use crate::tree::geometry::Placement;
 use crate::tree::moments::Moments;
 use crate::tree::picture_start::PictureRounding;
-use crate::tree::{Geometry, Instance, Tree};
+use crate::tree::{Geometry, GeometryKind, Instance, Tree};
 use crate::{listing, surface};
 
 /// A bounding volume hierarchy over geometries, ready for queries from any number of threads.
@@ -365,6 +365,19 @@ impl Accel {
     /// If `hit` comes from another tree and refers to geometry that this one lacks.
     pub fn picture_surface(&self, ray: &Ray, hit: &Hit) -> Surface {
         surface::picture_surface(&self.tree, ray, hit)
+    }
+
+    /// The map of an instance of the tree that stands still, by its position in the list that the tree was built from,
+    /// and the rounding of picture rays at triangles of meshes that are directly in it, in its own space.
+    pub fn still_instance(&self, position: u32) -> Option<(&Transform, Option<PictureRounding>)> {
+        let GeometryKind::Instance(Instance { tree, world_from_object: Placement::Still(map) }) =
+            &self.tree.geometries.get(position as usize)?.kind
+        else {
+            return None;
+        };
+        // Without a picture start, all rays are in double precision, in instances too.
+        let picture = self.tree.picture_start().and(tree.picture.as_ref());
+        Some((map, picture.map(|picture| picture.rounding)))
     }
 
     /// The closest hits of picture rays.

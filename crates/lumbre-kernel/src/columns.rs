@@ -151,6 +151,18 @@ impl HitColumns {
         self.id[i] != Self::MISS && (self.geometry[i] & WHOLE == 0 || self.geometry[i] & PLAIN != 0)
     }
 
+    /// The position of the instance around a hit, if there is exactly one: see [`Hit::only_instance`].
+    #[inline]
+    pub fn only_instance(&self, i: usize) -> Option<u32> {
+        if self.id[i] == Self::MISS || self.geometry[i] & WHOLE == 0 {
+            return None;
+        }
+        match &self.whole[(self.geometry[i] & !(WHOLE | PLAIN)) as usize] {
+            WholeHit::Near { instance, .. } => instance.map(|(position, _)| position),
+            WholeHit::Nested(hit) => hit.only_instance(),
+        }
+    }
+
     /// The complete hit of a ray, for [`Accel::surface`](crate::Accel::surface) and similar methods.
     pub fn to_hit(&self, i: usize) -> Option<Hit> {
         let (id, geometry) = (self.id[i], self.geometry[i]);

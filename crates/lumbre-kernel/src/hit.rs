@@ -45,3 +45,12 @@ pub struct Hit {
     /// The positions of those instances in the lists that their trees were built from.
     pub(crate) route: InstancePath,
 }
+
+impl Hit {
+    /// The position of the instance around the hit in the list that the tree was built from, if there is exactly one:
+    /// for [`Accel::still_instance`](crate::Accel::still_instance).
+    #[inline]
+    pub fn only_instance(&self) -> Option<u32> {
+        if let [position] = self.route[..] { Some(position) } else { None }
+    }
+}

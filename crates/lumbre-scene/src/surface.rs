@@ -436,7 +436,9 @@ fn plain(surface: &Surface) -> ShadingGeometry {
 
 /// A triangle hit, as computed in lanes.
 #[derive(Clone, Copy, Debug)]
-pub struct TrianglePoint {
+pub struct TrianglePoint<'a> {
+    /// The map from the space of its mesh to the world; `None` for a top-level mesh.
+    pub placement: Option<&'a Transform>,
     /// The triangle of its mesh.
     pub triangle: u32,
     /// The barycentrics of its second and third corner.
@@ -454,10 +456,10 @@ pub struct TrianglePoint {
 }
 
 impl MeshAttributes {
-    /// The texture context at a point of a static top-level mesh triangle, without the derivatives of its normal.
+    /// The texture context at a point of a static triangle, without the derivatives of its normal.
     pub(crate) fn texture_context(
         &self,
-        met: &TrianglePoint,
+        met: &TrianglePoint<'_>,
         footprint: &Footprint,
     ) -> (TextureContext, LocalSurface) {
         let corners = self.corners(met.triangle);
@@ -477,6 +479,10 @@ impl MeshAttributes {
         } else {
             along_a.cross(along_b).normalize_or(DVec3::Z).any_orthonormal_pair()
         };
+        let (dpdu, dpdv) = match met.placement {
+            None => (dpdu, dpdv),
+            Some(map) => (map.vector(dpdu), map.vector(dpdv)),
+        };
         let spot = footprint.on_plane(
             met.point,
             met.geometric.as_dvec3(),
@@ -494,7 +500,7 @@ impl MeshAttributes {
             geometric: met.geometric,
             handedness: 1.0,
         };
-        self.align(&mut surface, corners, &blend, None);
+        self.align(&mut surface, corners, &blend, met.placement);
         let context = TextureContext {
             point: met.point,
             normal: met.normal,

@@ -18,7 +18,7 @@ pub struct SurfaceTable {
     rows: Rows,
 }
 
-/// A static top-level mesh whose faces emit uniformly.
+/// A static mesh whose faces emit uniformly.
 #[derive(Clone, Debug)]
 pub struct TriangleSurface {
     /// Its triangles.
@@ -140,7 +140,7 @@ impl TriangleSurface {
     /// 709, or at the given wavelengths.
     pub fn scattering(
         &self,
-        met: &TrianglePoint,
+        met: &TrianglePoint<'_>,
         footprint: &Footprint,
         normals: ShadingNormals,
         spectral: Option<SpectralLookup>,

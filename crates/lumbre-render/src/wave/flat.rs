@@ -1,6 +1,5 @@
 //! Vertices on flat triangles, in lanes: points with their errors, normals, and the light that such surfaces emit.
 
-use lumbre_math::Vec3;
 use lumbre_scene::light::lanes::Receiver;
 use lumbre_scene::{SurfaceTable, TriangleSurface};
 use lumbre_shading::Spectrum;
@@ -26,8 +25,8 @@ pub(crate) struct FlatHits {
     /// The corners of each triangle in its mesh.
     pub(crate) indices: Vec<[u32; 3]>,
     /// The corners relative to the origin, corner by corner.
-    corners: [Vec<f32>; 9],
-    origin: [Vec<f64>; 3],
+    pub(crate) corners: [Vec<f64>; 9],
+    pub(crate) origin: [Vec<f64>; 3],
     pub(crate) local: [Vec<f32>; 2],
     pub(crate) distance: Vec<f32>,
     pub(crate) outward: Vec<f32>,
@@ -43,9 +42,9 @@ impl FlatHits {
         for column in [&mut self.path, &mut self.id, &mut self.triangle, &mut self.row, &mut self.flags] {
             grow(column, len);
         }
-        let f32s = self.corners.iter_mut().chain(&mut self.local).chain(&mut self.emission);
+        let f32s = self.local.iter_mut().chain(&mut self.emission);
         f32s.chain([&mut self.distance, &mut self.outward]).for_each(|column| grow(column, len));
-        self.origin.iter_mut().for_each(|column| grow(column, len));
+        self.corners.iter_mut().chain(&mut self.origin).for_each(|column| grow(column, len));
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -90,18 +89,17 @@ impl FlatHits {
         }));
         for (at, (&id, corners)) in self.id.iter().zip(&self.indices).enumerate() {
             let Some(surface) = surfaces.surface(id) else { continue };
-            put_corners(&mut self.corners, at, corners.map(|corner| surface.mesh.positions[corner as usize]));
+            let corners = corners.map(|corner| surface.mesh.positions[corner as usize].as_dvec3().to_array());
+            put_corners(&mut self.corners, at, corners);
         }
     }
 }
 
 /// Writes the vectors of three corners, corner by corner.
 #[inline]
-pub(crate) fn put_corners(columns: &mut [Vec<f32>; 9], at: usize, corners: [Vec3; 3]) {
-    for (corner, columns) in corners.into_iter().zip(columns.chunks_exact_mut(3)) {
-        columns[0][at] = corner.x;
-        columns[1][at] = corner.y;
-        columns[2][at] = corner.z;
+pub(crate) fn put_corners<T>(columns: &mut [Vec<T>; 9], at: usize, corners: [[T; 3]; 3]) {
+    for (column, x) in columns.iter_mut().zip(corners.into_iter().flatten()) {
+        column[at] = x;
     }
 }
 
@@ -215,9 +213,9 @@ pub(crate) fn triangle<R: Real>(
 #[inline(always)]
 pub(crate) fn corner<R: Real>(hits: &FlatHits, at: usize, first: usize) -> V3<R::Double> {
     V3 {
-        x: R::Double::from_single(R::from_slice(&hits.corners[first][at..])),
-        y: R::Double::from_single(R::from_slice(&hits.corners[first + 1][at..])),
-        z: R::Double::from_single(R::from_slice(&hits.corners[first + 2][at..])),
+        x: R::Double::from_slice(&hits.corners[first][at..]),
+        y: R::Double::from_slice(&hits.corners[first + 1][at..]),
+        z: R::Double::from_slice(&hits.corners[first + 2][at..]),
     }
 }
 

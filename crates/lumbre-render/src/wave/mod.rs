@@ -15,6 +15,7 @@ mod media;
 mod merge;
 mod pairs;
 pub(crate) mod paths;
+mod placed;
 mod primary_hits;
 mod search;
 pub(crate) mod setting;
@@ -72,9 +73,11 @@ pub(crate) struct Wave<'s> {
     hits: Hits,
     flat: FlatHits,
     smooth: SmoothHits,
+    /// Triangles in instances.
+    placed: SmoothHits,
     /// Paths that left the scene.
     escaped: Vec<u32>,
-    /// Paths whose vertices are made one by one: their hit is no top-level triangle, or needs more than lanes do.
+    /// Paths whose vertices are made one by one: their hit is no triangle, or needs more than lanes do.
     not_in_lanes: Vec<u32>,
     vertices: Vertices<'s>,
     found: Vec<Found>,

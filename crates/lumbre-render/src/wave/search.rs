@@ -23,7 +23,7 @@ pub(crate) struct Hits {
     times: Vec<f64>,
 }
 
-/// A triangle of a top-level mesh that a ray met.
+/// A triangle of a mesh that a ray met.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MetTriangle {
     /// The id of its geometry.
@@ -181,6 +181,24 @@ impl Hits {
         let hit = self.hit(path).filter(|hit| hit.instances.is_empty())?;
         let local = hit.root.local.as_vec2().to_array();
         Some(MetTriangle { id: hit.id, triangle: hit.primitive, local })
+    }
+
+    /// The triangle that a ray met in a top-level instance, and the position of that in the tree.
+    #[inline]
+    pub(crate) fn triangle_in_instance(&self, path: usize) -> Option<(MetTriangle, u32)> {
+        let column = self.column(path);
+        if self.is_single && self.hit_behind(column).is_none() {
+            let columns = &self.columns;
+            let met = MetTriangle {
+                id: columns.id[column],
+                triangle: columns.primitive[column],
+                local: [columns.local[0][column], columns.local[1][column]],
+            };
+            return Some((met, columns.only_instance(column)?));
+        }
+        let hit = self.hit(path)?;
+        let local = hit.root.local.as_vec2().to_array();
+        Some((MetTriangle { id: hit.id, triangle: hit.primitive, local }, hit.only_instance()?))
     }
 
     /// The length of a ray up to its hit.

@@ -1,7 +1,7 @@
 //! Vertices on triangles with vertex normals or textured materials, in lanes.
 
 use lumbre_math::Vec3;
-use lumbre_scene::{SurfaceTable, TrianglePoint, TriangleSurface, UniformBsdf};
+use lumbre_scene::{Scene, TrianglePoint, TriangleSurface, UniformBsdf};
 use lumbre_shading::lanes::{BsdfKind, facing};
 use lumbre_shading::{Bsdf, ShadingFrame, ShadingNormals};
 use lumbre_simd::math::orthonormal_basis;
@@ -9,6 +9,7 @@ use lumbre_simd::{Double, Job, Mask, Real, UInt, V3};
 
 use crate::wave::flat::{FlatHits, corner, find_light, put_corners, put3, put64, triangle};
 use crate::wave::paths::{Paths, grow};
+use crate::wave::placed::Placements;
 use crate::wave::search::MetTriangle;
 use crate::wave::setting::{Found, Setting};
 use crate::wave::vertices::{FOLDS, HAS_TERMINATOR_OFFSET, LIT_FROM_BELOW, Place, SIDED, Vertices, gather3};
@@ -27,12 +28,15 @@ pub(crate) struct SmoothHits {
     /// The computed outward geometric and shading normals.
     pub(crate) geometric: [Vec<f32>; 3],
     pub(crate) shading: [Vec<f32>; 3],
+    /// The instances around them; empty for triangles of top-level meshes.
+    placements: Placements,
 }
 
 impl SmoothHits {
     /// Clears the columns and reserves `len` hits.
     pub(crate) fn reset(&mut self, len: usize) {
         self.base.reset(len);
+        self.placements.clear();
         self.kinds.clear();
         grow(&mut self.is_textured, len);
         let columns = self.normals.iter_mut().chain(&mut self.geometric).chain(&mut self.shading);
@@ -55,24 +59,42 @@ impl SmoothHits {
         self.is_textured[at] = u32::from(bsdf.is_none());
     }
 
+    /// Appends what a path met in the instance at this position in the tree.
+    #[inline]
+    pub(crate) fn push_placed(
+        &mut self,
+        surface: &TriangleSurface,
+        path: usize,
+        (met, instance): (MetTriangle, u32),
+        distance: f32,
+        bsdf: Option<UniformBsdf>,
+    ) {
+        self.push(surface, path, met, distance, bsdf);
+        self.placements.push(instance);
+    }
+
     /// Reads the corners of all triangles and the normals there: see [`FlatHits::load`].
-    pub(crate) fn load(&mut self, surfaces: &SurfaceTable) {
+    pub(crate) fn load(&mut self, scene: &Scene, is_single: bool) {
+        let surfaces = scene.tables();
         self.base.load(surfaces);
         for (at, &corners) in self.base.indices.iter().enumerate() {
             let normals = self.base.surface(surfaces, at).and_then(|surface| surface.normals(corners));
-            put_corners(&mut self.normals, at, normals.unwrap_or_default());
+            put_corners(&mut self.normals, at, normals.unwrap_or_default().map(|normal| normal.to_array()));
         }
+        self.placements.apply(scene.accel(), is_single, &mut self.base, &mut self.normals);
     }
 
     /// The surface point of a hit, for its material's textures.
-    pub(crate) fn point(
+    pub(crate) fn point<'s>(
         &self,
+        scene: &'s Scene,
         at: usize,
         vertices: &Vertices<'_>,
         vertex: usize,
         direction: Vec3,
-    ) -> TrianglePoint {
+    ) -> TrianglePoint<'s> {
         TrianglePoint {
+            placement: self.placements.map(scene.accel(), at),
             triangle: self.base.triangle[at],
             local: [self.base.local[0][at], self.base.local[1][at]],
             point: vertices.point(vertex),
@@ -133,7 +155,11 @@ impl Job for SmoothVertices<'_, '_> {
             // Padding lanes need a valid path too.
             let at = R::UInt::select(lanes, at, R::UInt::splat(0));
             let (point, error, face) = triangle::<R>(&hits.base, done, R::one());
-            let error = rounding.grow::<R>(point, error);
+            let (error, face) = if hits.placements.is_empty() {
+                (rounding.grow::<R>(point, error), face)
+            } else {
+                hits.placements.adjust::<R>(done, error, face)
+            };
             let outward = R::from_slice(&hits.base.outward[done..]);
             let (geometric, shading) = normals_at::<R>(hits, done, face, outward);
             let direction = gather3::<R>(&paths.direction, at);

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use lumbre_image::{Bitmap, Channels, Encoding, PixelData};
 use lumbre_math::{DAffine3, DMat3, DVec2, DVec3, Transform, Vec2, Vec3};
 use lumbre_scene::{
-    Camera, CameraKind, GeometryDesc, MaterialId, MeshDesc, NamedMaterial, SamplerDesc, SamplerKind, Scene,
-    SceneDesc, ShapeDesc, View,
+    Camera, CameraKind, GeometryDesc, InstanceDesc, MaterialId, MeshDesc, NamedMaterial, ObjectDesc,
+    ObjectId, SamplerDesc, SamplerKind, Scene, SceneDesc, ShapeDesc, View,
 };
 use lumbre_shading::{
     ImageFilter, ImageTexture, Mapping2d, Material, MaterialKind, MipMap, MipMapOptions, PrincipledParams,
@@ -76,7 +76,16 @@ fn bumpy() -> Material {
     Material { normal_map: Some(image(tilted)), ..textured() }
 }
 
-fn scene(material: Material, reverse: bool) -> Scene {
+/// A map that mirrors and shears around the centre of the ball.
+fn sheared() -> Transform {
+    let linear =
+        DMat3::from_cols(DVec3::new(-0.9, 0.2, 0.1), DVec3::new(0.3, 0.8, -0.2), DVec3::new(0.0, 0.25, 1.1));
+    let affine = DAffine3::from_mat3_translation(linear, CENTRE - linear * CENTRE);
+    Transform::from_affine(affine).unwrap()
+}
+
+/// The ball, if `instance` is given as an instance.
+fn scene(material: Material, reverse: bool, instance: Option<Transform>) -> Scene {
     let (from, forward) = (CENTRE + DVec3::new(2.0, 1.3, 4.0), DVec3::new(-2.0, -1.3, -4.0).normalize());
     let right = forward.cross(DVec3::Y).normalize();
     let matrix = DMat3::from_cols(right, right.cross(forward), forward);
@@ -102,10 +111,22 @@ fn scene(material: Material, reverse: bool) -> Scene {
         area_light: None,
         alpha: None,
     };
+    let (mut shapes, mut objects, mut instances) = (vec![shape], vec![], vec![]);
+    if let Some(map) = instance {
+        let name = "ball".to_owned();
+        objects.push(ObjectDesc { name, shapes: std::mem::take(&mut shapes), instances: vec![] });
+        // The second makes sure that it is not simply taken into the world.
+        let far = Transform::translate(DVec3::new(0.0, 0.0, -40.0));
+        instances.extend(
+            [map, far].map(|map| InstanceDesc { object: ObjectId(0), world_from_object: map.into() }),
+        );
+    }
     Scene::build(SceneDesc {
         cameras: vec![camera],
         materials: vec![NamedMaterial { name: None, material: Arc::new(material) }],
-        shapes: vec![shape],
+        shapes,
+        objects,
+        instances,
         ..SceneDesc::default()
     })
     .unwrap()
@@ -154,13 +175,20 @@ fn vector(columns: &[Vec<f32>; 3], at: usize) -> Vec3 {
     Vec3::new(columns[0][at], columns[1][at], columns[2][at])
 }
 
-fn compare(material: Material, reverse: bool, shading_normals: ShadingNormals) -> [usize; 3] {
-    let scene = scene(material, reverse);
+fn compare(
+    material: Material,
+    reverse: bool,
+    instance: Option<Transform>,
+    shading_normals: ShadingNormals,
+) -> [usize; 3] {
+    let is_placed = instance.is_some();
+    let scene = scene(material, reverse, instance);
     let lanes = first_vertices(&scene, shading_normals, InstructionSet::detect(), false);
     let oracle = first_vertices(&scene, shading_normals, InstructionSet::detect(), true);
     let (a, b) = (&lanes.vertices, &oracle.vertices);
-    assert_eq!(lanes.smooth.base.len(), a.len);
-    assert_eq!(oracle.smooth.base.len(), 0);
+    let met = if is_placed { &lanes.placed } else { &lanes.smooth };
+    assert_eq!(met.base.len(), a.len);
+    assert_eq!(oracle.smooth.base.len() + oracle.placed.base.len(), 0);
     assert_eq!(a.len, b.len);
     assert!(a.len > 500, "{}", a.len);
     let (mut folds, mut rises, mut others) = (0, 0, 0);
@@ -206,11 +234,11 @@ fn compare(material: Material, reverse: bool, shading_normals: ShadingNormals) -
 
 #[test]
 fn vertices_in_lanes_are_those_made_one_by_one() {
-    for reverse in [false, true] {
+    for (reverse, instance) in [false, true].into_iter().flat_map(|r| [(r, None), (r, Some(sheared()))]) {
         for make in [uniform, textured, bumpy] {
-            let [folds, rises, all] = compare(make(), reverse, ShadingNormals::Lumbre);
+            let [folds, rises, all] = compare(make(), reverse, instance, ShadingNormals::Lumbre);
             assert!(folds > all / 3 && rises > all / 8, "{folds} {rises} {all}");
-            let [folds, rises, all] = compare(make(), reverse, ShadingNormals::Pbrt);
+            let [folds, rises, all] = compare(make(), reverse, instance, ShadingNormals::Pbrt);
             assert!(folds > all / 3 && rises == 0, "{folds} {rises} {all}");
         }
     }
@@ -218,10 +246,16 @@ fn vertices_in_lanes_are_those_made_one_by_one() {
 
 #[test]
 fn vertices_have_the_same_bits_at_every_instruction_set() {
-    let scene = scene(bumpy(), false);
-    let scalar = first_vertices(&scene, ShadingNormals::Lumbre, InstructionSet::SCALAR, false);
+    for instance in [None, Some(sheared())] {
+        let scene = scene(bumpy(), false, instance);
+        compare_instruction_sets(&scene);
+    }
+}
+
+fn compare_instruction_sets(scene: &Scene) {
+    let scalar = first_vertices(scene, ShadingNormals::Lumbre, InstructionSet::SCALAR, false);
     for set in InstructionSet::available() {
-        let lanes = first_vertices(&scene, ShadingNormals::Lumbre, set, false);
+        let lanes = first_vertices(scene, ShadingNormals::Lumbre, set, false);
         let (a, b) = (&lanes.vertices, &scalar.vertices);
         assert_eq!(a.len, b.len);
         for i in 0..a.len {

@@ -3,7 +3,7 @@
 use lumbre_geometry::Ray;
 use lumbre_math::Vec3;
 use lumbre_scene::light::lanes::Receiver;
-use lumbre_scene::{Footprint, Interaction};
+use lumbre_scene::{Footprint, Interaction, TriangleSurface};
 use lumbre_shading::medium::{DistanceSample, sample_henyey_greenstein};
 use lumbre_shading::subsurface::SubsurfaceParams;
 use lumbre_shading::{HomogeneousMedium, Material, Spectrum};
@@ -17,7 +17,7 @@ use crate::wave::Wave;
 use crate::wave::flat::FlatVertices;
 use crate::wave::paths::{OnePath, SCATTERED, sides};
 use crate::wave::setting::Setting;
-use crate::wave::smooth::{SmoothVertices, flags_of, frame_for};
+use crate::wave::smooth::{SmoothHits, SmoothVertices, flags_of, frame_for};
 use crate::wave::vertices::{FOLDS, LIT_FROM_BELOW};
 
 /// Minimum collisions in media before Russian roulette.
@@ -32,6 +32,7 @@ impl<'s> Wave<'s> {
         self.vertices.reset(self.paths.len, scene.tables().rows());
         self.flat.reset(self.paths.len);
         self.smooth.reset(self.paths.len);
+        self.placed.reset(self.paths.len);
         self.found.clear();
         self.collided.clear();
         // Regularization depends on the path so far, which BSDF rows of the scene do not.
@@ -44,31 +45,17 @@ impl<'s> Wave<'s> {
             }
             let in_the_open =
                 self.slots.interiors.get(self.paths.slot[path] as usize).is_none_or(MediumStack::is_empty);
-            let met = if takes_triangles && in_the_open { self.hits.triangle(path) } else { None };
-            let surface = met.and_then(|met| Some((scene.tables().surface(met.id)?, met)));
-            let Some((surface, met)) = surface else {
+            if !(takes_triangles && in_the_open && self.push_triangle(setting, path)) {
                 not_in_lanes.push(path as u32);
                 continue;
-            };
-            let distance = self.hits.distance(path);
-            // Spectral renders look up the material at the wavelengths of the path.
-            let bsdf = surface.bsdf.filter(|_| !setting.is_spectral);
-            match bsdf {
-                Some(bsdf) if !surface.is_smooth() => {
-                    self.flat.push(surface, path, met, distance);
-                    let ends = self.paths.depth[path] & !SCATTERED == setting.max_depth;
-                    if !ends {
-                        self.vertices.queue(self.flat.len() - 1, bsdf.kind);
-                    }
-                }
-                _ => self.smooth.push(surface, path, met, distance, bsdf),
             }
             if record.journal.is_some() {
                 self.note_triangle(setting, path, record);
             }
         }
         self.flat.load(scene.tables());
-        self.smooth.load(scene.tables());
+        self.smooth.load(scene, self.hits.is_single());
+        self.placed.load(scene, self.hits.is_single());
         setting.instruction_set.run(FlatVertices {
             setting,
             hits: &self.flat,
@@ -77,14 +64,16 @@ impl<'s> Wave<'s> {
             found: &mut self.found,
             is_single: self.hits.is_single(),
         });
-        setting.instruction_set.run(SmoothVertices {
-            setting,
-            hits: &mut self.smooth,
-            paths: &self.paths,
-            vertices: &mut self.vertices,
-            found: &mut self.found,
-            is_single: self.hits.is_single(),
-        });
+        for hits in [&mut self.smooth, &mut self.placed] {
+            setting.instruction_set.run(SmoothVertices {
+                setting,
+                hits,
+                paths: &self.paths,
+                vertices: &mut self.vertices,
+                found: &mut self.found,
+                is_single: self.hits.is_single(),
+            });
+        }
         if setting.is_spectral {
             for found in &mut self.found {
                 let path = found.path as usize;
@@ -103,7 +92,10 @@ impl<'s> Wave<'s> {
         if record.journal.is_some() && self.flat.len() > 0 && self.vertices.is_unqueued() {
             record.note(|| Event::Ended(End::Depth));
         }
-        self.scatter_smooth(setting, record);
+        let (smooth, placed) = (std::mem::take(&mut self.smooth), std::mem::take(&mut self.placed));
+        self.scatter_smooth(setting, self.flat.len(), &smooth, record);
+        self.scatter_smooth(setting, self.flat.len() + smooth.base.len(), &placed, record);
+        (self.smooth, self.placed) = (smooth, placed);
         for &path in &not_in_lanes {
             let path = path as usize;
             let slot = self.paths.slot[path] as usize;
@@ -117,22 +109,58 @@ impl<'s> Wave<'s> {
         self.not_in_lanes = not_in_lanes;
     }
 
-    /// Queues the vertices of smooth hits, which follow the flat ones, and looks up textured materials.
-    fn scatter_smooth(&mut self, setting: &Setting<'s>, record: &mut Record) {
-        let first = self.flat.len();
-        for at in 0..self.smooth.base.len() {
-            let (vertex, path) = (first + at, self.smooth.base.path[at] as usize);
+    /// Adds what a path met to the triangles for lanes; false if it is none, or needs more than lanes do.
+    #[inline]
+    fn push_triangle(&mut self, setting: &Setting<'s>, path: usize) -> bool {
+        let (scene, distance) = (setting.scene, self.hits.distance(path));
+        // Spectral renders look up the material at the wavelengths of the path.
+        let bsdf_of = |surface: &TriangleSurface| surface.bsdf.filter(|_| !setting.is_spectral);
+        if let Some(met) = self.hits.triangle(path) {
+            let Some(surface) = scene.tables().surface(met.id) else { return false };
+            match bsdf_of(surface) {
+                Some(bsdf) if !surface.is_smooth() => {
+                    self.flat.push(surface, path, met, distance);
+                    let ends = self.paths.depth[path] & !SCATTERED == setting.max_depth;
+                    if !ends {
+                        self.vertices.queue(self.flat.len() - 1, bsdf.kind);
+                    }
+                }
+                bsdf => self.smooth.push(surface, path, met, distance, bsdf),
+            }
+            return true;
+        }
+        let Some(placed @ (met, instance)) = self.hits.triangle_in_instance(path) else { return false };
+        let Some(surface) = scene.tables().surface(met.id) else { return false };
+        // Lanes know lights by their triangles, of which an instance may have many copies.
+        if surface.emission.is_some() || scene.accel().still_instance(instance).is_none() {
+            return false;
+        }
+        self.placed.push_placed(surface, path, placed, distance, bsdf_of(surface));
+        true
+    }
+
+    /// Queues the vertices of hits, the first of which is `first`, and looks up textured materials.
+    fn scatter_smooth(
+        &mut self,
+        setting: &Setting<'s>,
+        first: usize,
+        hits: &SmoothHits,
+        record: &mut Record,
+    ) {
+        for at in 0..hits.base.len() {
+            let (vertex, path) = (first + at, hits.base.path[at] as usize);
             if self.paths.depth[path] & !SCATTERED == setting.max_depth {
                 record.note(|| Event::Ended(End::Depth));
                 continue;
             }
-            if let Some(kind) = self.smooth.kinds[at] {
+            if let Some(kind) = hits.kinds[at] {
                 self.vertices.queue(vertex, kind);
                 continue;
             }
             let footprint = self.footprint(path);
-            let point = self.smooth.point(at, &self.vertices, vertex, self.paths.direction(path));
-            let surface = self.smooth.base.surface(setting.scene.tables(), at);
+            let direction = self.paths.direction(path);
+            let point = hits.point(setting.scene, at, &self.vertices, vertex, direction);
+            let surface = hits.base.surface(setting.scene.tables(), at);
             let slot = self.paths.slot[path] as usize;
             let spectral = self.slots.spectral(slot);
             let scattering = surface.and_then(|surface| {
