@@ -235,6 +235,12 @@ impl Camera {
         }
     }
 
+    /// The part of the image plane that the picture shows, whatever its size: x0, x1, y0, y1, in units of half the field
+    /// of view, or for an orthographic camera in those of the world; `None` if that follows from the size.
+    pub fn window(&self) -> Option<[f64; 4]> {
+        self.screen_window.or_else(|| self.frame_aspect.map(window))
+    }
+
     /// A pinhole camera at `eye` that looks at `target`, with `up` upwards in the picture, in a right-handed world:
     /// objects on the right are on the right of the picture. `fov` is the full field of view in degrees along the
     /// shorter side.
@@ -330,13 +336,17 @@ pub struct View {
     size: [u32; 2],
 }
 
+/// The part of the image plane that a picture of an aspect ratio shows: see [`Camera::window`].
+fn window(aspect: f64) -> [f64; 4] {
+    let half = half_window(aspect);
+    [-half.x, half.x, -half.y, half.y]
+}
+
 impl View {
     /// `camera` with a picture of `width` × `height` pixels, both at least 1.
     pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
         let pixels = DVec2::new(f64::from(width.max(1)), f64::from(height.max(1)));
-        let aspect = camera.frame_aspect.unwrap_or(pixels.x / pixels.y);
-        let half = half_window(aspect);
-        let [x0, x1, y0, y1] = camera.screen_window.unwrap_or([-half.x, half.x, -half.y, half.y]);
+        let [x0, x1, y0, y1] = camera.window().unwrap_or_else(|| window(pixels.x / pixels.y));
         let (corner, opposite) = match camera.kind {
             CameraKind::Perspective { fov, .. } => {
                 let slope = (0.5 * fov.to_radians()).tangent();

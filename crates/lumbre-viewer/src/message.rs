@@ -311,6 +311,9 @@ pub(crate) struct CameraFacts {
     pub mirrored: bool,
     /// The field of view in degrees of a perspective camera.
     pub fov: Option<f64>,
+    /// The part of the image plane that it shows (left, right, bottom, top), in units of half the field of view, if the
+    /// file says so.
+    pub window: Option<[f64; 4]>,
 }
 
 /// An animation of the file.

@@ -163,6 +163,7 @@ fn facts(
             kind: kind.to_owned(),
             mirrored: camera.world_from_camera.is_mirror(),
             fov: field_of_view(camera),
+            window: camera.window(),
         }
     };
     let parameters = lumbre::parameters(desc);

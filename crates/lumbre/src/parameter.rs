@@ -1,7 +1,7 @@
 //! The parameters of a description that a [`crate::Setting`] can set.
 
 use lumbre_image::Rgb;
-use lumbre_math::DVec3;
+use lumbre_math::{DVec3, Transform};
 use lumbre_scene::{LightDesc, SceneDesc};
 use lumbre_shading::Texture;
 
@@ -82,14 +82,17 @@ pub fn parameters(desc: &SceneDesc) -> Vec<Parameter> {
                 add("point", "intensity", ParameterKind::Light, numbers(*intensity));
                 add("point", "from", ParameterKind::Point, point(*from));
             }
-            LightDesc::Spot { intensity, .. } => {
+            LightDesc::Spot { world_from_light, intensity, .. } => {
                 add("spot", "intensity", ParameterKind::Light, numbers(*intensity));
+                add("spot", "from", ParameterKind::Point, origin(world_from_light));
             }
-            LightDesc::Goniometric { intensity, .. } => {
+            LightDesc::Goniometric { world_from_light, intensity, .. } => {
                 add("goniometric", "intensity", ParameterKind::Light, numbers(*intensity));
+                add("goniometric", "from", ParameterKind::Point, origin(world_from_light));
             }
-            LightDesc::Projection { intensity, .. } => {
+            LightDesc::Projection { world_from_light, intensity, .. } => {
                 add("projection", "intensity", ParameterKind::Light, numbers(*intensity));
+                add("projection", "from", ParameterKind::Point, origin(world_from_light));
             }
             LightDesc::Distant { irradiance, .. } | LightDesc::Disc { irradiance, .. } => {
                 add("distant", "irradiance", ParameterKind::Light, numbers(*irradiance));
@@ -143,6 +146,11 @@ fn numbers(colour: Rgb) -> Vec<f64> {
     colour.to_array().map(f64::from).to_vec()
 }
 
+/// Where a light stands.
+fn origin(world_from_light: &Transform) -> Vec<f64> {
+    point(world_from_light.point(DVec3::ZERO))
+}
+
 fn point(point: DVec3) -> Vec<f64> {
     point.to_array().to_vec()
 }
@@ -159,7 +167,7 @@ mod tests {
     #[test]
     fn every_parameter_that_is_listed_can_be_set_to_what_it_is() {
         let text = "LookAt 0 -9 2 0 0 0 0 0 1 Camera \"perspective\" WorldBegin
-            LightSource \"point\" \"rgb I\" [1 2 3] LightSource \"distant\" LightSource \"infinite\"
+            LightSource \"point\" \"rgb I\" [1 2 3] LightSource \"spot\" \"point3 from\" [1 2 3] LightSource \"distant\" LightSource \"infinite\"
             MakeNamedMaterial \"the.wood\" \"string type\" \"coateddiffuse\" \"rgb reflectance\" [.2 .3 .4]
             MakeNamedMaterial \"paint\" \"string type\" \"principled\"
             AreaLightSource \"diffuse\" NamedMaterial \"the.wood\" Shape \"sphere\"";

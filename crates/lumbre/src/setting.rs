@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lumbre_formats::diagnostic::{nearest_name, number, quoted};
 use lumbre_image::Rgb;
-use lumbre_math::DVec3;
+use lumbre_math::{DVec3, Transform};
 use lumbre_scene::{Camera, CameraKind, FilmDesc, GeometryDesc, LightDesc, SceneDesc, ShapeDesc};
 use lumbre_shading::hair::HairColour;
 use lumbre_shading::{
@@ -197,9 +197,9 @@ impl Setting {
         }
         let known: &[&str] = match light {
             LightDesc::Point { .. } => &["from", "intensity", "scale"],
-            LightDesc::Spot { .. } => &["intensity", "coneangle", "conedeltaangle", "scale"],
-            LightDesc::Goniometric { .. } => &["intensity", "scale"],
-            LightDesc::Projection { .. } => &["intensity", "fov", "scale"],
+            LightDesc::Spot { .. } => &["from", "intensity", "coneangle", "conedeltaangle", "scale"],
+            LightDesc::Goniometric { .. } => &["from", "intensity", "scale"],
+            LightDesc::Projection { .. } => &["from", "intensity", "fov", "scale"],
             LightDesc::Distant { .. } => &["irradiance", "scale"],
             LightDesc::Disc { .. } => &["irradiance", "angle", "scale"],
             LightDesc::Infinite { .. } | LightDesc::Portal { .. } => &["radiance", "scale"],
@@ -221,6 +221,17 @@ impl Setting {
                 LightDesc::Pov(light) => Arc::make_mut(light).colour *= factor,
                 LightDesc::Moving { .. } | LightDesc::Spectral { .. } => {}
             }
+            return Ok(());
+        }
+        if self.parameter == "from"
+            && let LightDesc::Spot { world_from_light, .. }
+            | LightDesc::Goniometric { world_from_light, .. }
+            | LightDesc::Projection { world_from_light, .. } = light
+        {
+            let before = world_from_light.point(DVec3::ZERO);
+            let mut from = before;
+            self.set(Slot::Point(&mut from))?;
+            *world_from_light = Transform::translate(from - before) * *world_from_light;
             return Ok(());
         }
         let parameter = match light {
@@ -718,6 +729,22 @@ mod tests {
         set(&mut desc, "camera.fov=35").unwrap();
         set(&mut desc, "camera.0.lensradius=0.25").unwrap();
         set(&mut desc, "film.exposure=2").unwrap();
+        let mut spot = desc.clone();
+        spot.lights[0] = LightDesc::Spot {
+            world_from_light: Transform::look_at_left(DVec3::ONE, DVec3::ZERO, DVec3::Z).unwrap(),
+            intensity: Rgb::splat(1.0),
+            cone_angle: 30.0,
+            cone_delta_angle: 5.0,
+        };
+        let axis = |desc: &SceneDesc| match &desc.lights[0] {
+            LightDesc::Spot { world_from_light: map, .. } => (map.point(DVec3::ZERO), map.vector(DVec3::Z)),
+            _ => panic!(),
+        };
+        let before = axis(&spot);
+        set(&mut spot, "light.0.from=4,-2,3").unwrap();
+        assert!((before.0 - DVec3::ONE).length() < 1e-12);
+        assert!((axis(&spot).0 - DVec3::new(4.0, -2.0, 3.0)).length() < 1e-12);
+        assert_eq!(axis(&spot).1, before.1, "it still points there");
         let LightDesc::Point { from, intensity } = &desc.lights[0] else { panic!() };
         assert_eq!((*from, *intensity), (DVec3::new(1.0, -2.0, 3.0), Rgb::new(2.5, 5.0, 7.5)));
         let light = desc.shapes[0].area_light.as_ref().unwrap();

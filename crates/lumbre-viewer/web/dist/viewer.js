@@ -414,6 +414,130 @@
     return add(add(scale(v, c), scale(cross(axis, v), s)), scale(axis, dot(axis, v) * (1 - c)));
   }
 
+  // src/handles.ts
+  var STEP = 0.02;
+  var KEYS = {
+    ArrowLeft: [-1, 0, 0],
+    ArrowRight: [1, 0, 0],
+    ArrowUp: [0, 1, 0],
+    ArrowDown: [0, -1, 0],
+    PageUp: [0, 0, 1],
+    PageDown: [0, 0, -1]
+  };
+  var LightHandles = class {
+    constructor(page2, edit) {
+      this.page = page2;
+      this.edit = edit;
+      this.list.addEventListener("toggle", () => this.draw());
+    }
+    page;
+    edit;
+    layer = byId("handles");
+    list = byId("light-details");
+    handles = [];
+    held = null;
+    isWaiting = false;
+    /** The lights of a scene. */
+    show(parameters) {
+      const places = parameters.filter(({ path, kind }) => kind === "point" && path.startsWith("light."));
+      const isSame = places.length === this.handles.length && places.every(({ path }, i) => this.handles[i]?.path === path);
+      if (!isSame) {
+        this.handles = places.map((place) => this.handle(place));
+        this.layer.replaceChildren(...this.handles.map(({ button }) => button));
+      }
+      for (const [i, { value }] of places.entries()) {
+        const handle = this.handles[i];
+        if (handle && value) handle.start = vector(value);
+      }
+      this.draw();
+    }
+    /** The edits that hold: a light that is not edited stands where the file says. */
+    take(settings) {
+      const edits = new Map(settings);
+      for (const handle of this.handles) {
+        const set = edits.get(handle.path);
+        if (handle !== this.held) handle.at = set === void 0 ? handle.start : vector(set.split(",").map(Number));
+      }
+      this.draw();
+    }
+    /** Puts the handles where the camera sees the lights. */
+    draw() {
+      const { camera: camera2, scene, state, watches } = this.page;
+      this.layer.hidden = !this.list.open || !scene || camera2.fov === null || watches;
+      if (this.layer.hidden) return;
+      const window = scene?.cameras[state?.camera ?? 0]?.window ?? null;
+      for (const { at, button } of this.handles) {
+        const seen = this.seen(at, window);
+        button.hidden = seen === null;
+        if (seen) [button.style.left, button.style.top] = [`${100 * seen[0]}%`, `${100 * seen[1]}%`];
+      }
+    }
+    /** The place in the picture of a point, in shares of its width and height; null behind the camera and outside. */
+    seen(point2, window) {
+      const { camera: camera2, sheet: sheet2 } = this.page;
+      const way = sub(point2, camera2.placement.eye);
+      const depth = dot(way, camera2.forward());
+      if (depth <= 0) return null;
+      const slope = this.slope();
+      const [x, y] = [dot(way, camera2.right()) / depth / slope, dot(way, camera2.upward()) / depth / slope];
+      const shorter = Math.min(sheet2.width, sheet2.height);
+      const [half2, high] = [sheet2.width / shorter, sheet2.height / shorter];
+      const [left, right, bottom, top] = window ?? [-half2, half2, -high, high];
+      const place = [(x - left) / (right - left), (top - y) / (top - bottom)];
+      return place.every((share) => share >= 0 && share <= 1) ? place : null;
+    }
+    /** Half the field of view, as a slope. */
+    slope() {
+      return Math.tan((this.page.camera.fov ?? 45) * Math.PI / 360);
+    }
+    handle({ path, owner, value }) {
+      const button = element("button", "", { className: "handle", title: `${owner}: drag it; with Shift, nearer and farther` });
+      button.setAttribute("aria-label", `Move ${owner}: arrow keys, Page Up and Page Down`);
+      const at = vector(value ?? [0, 0, 0]);
+      const handle = { path, start: at, at, button };
+      button.addEventListener("pointerdown", (event) => {
+        button.setPointerCapture(event.pointerId);
+        this.held = handle;
+      });
+      button.addEventListener("pointermove", (event) => {
+        if (this.held !== handle) return;
+        const { sheet: sheet2 } = this.page;
+        const pixel = 2 * this.slope() / (Math.min(sheet2.width, sheet2.height) * sheet2.scale());
+        const [x, y] = [event.movementX * pixel, -event.movementY * pixel];
+        this.move(handle, event.shiftKey ? [0, 0, y] : [x, y, 0]);
+      });
+      for (const end of ["pointerup", "pointercancel"]) {
+        button.addEventListener(end, () => {
+          this.held = null;
+        });
+      }
+      button.addEventListener("keydown", (event) => {
+        const along = KEYS[event.key];
+        if (!along) return;
+        event.preventDefault();
+        this.move(handle, scale(along, STEP));
+      });
+      return handle;
+    }
+    /** Moves a light to the right, up and away from the camera, in shares of its depth. */
+    move(handle, [right, up, away]) {
+      const { camera: camera2 } = this.page;
+      const depth = dot(sub(handle.at, camera2.placement.eye), camera2.forward());
+      const across = add(scale(camera2.right(), right * depth), scale(camera2.upward(), up * depth));
+      handle.at = add(handle.at, add(across, scale(camera2.forward(), away * depth)));
+      this.draw();
+      if (this.isWaiting) return;
+      this.isWaiting = true;
+      requestAnimationFrame(() => {
+        this.isWaiting = false;
+        this.edit(handle.path, handle.at.map(short).join(","));
+      });
+    }
+  };
+  function vector([x, y, z]) {
+    return [x ?? 0, y ?? 0, z ?? 0];
+  }
+
   // src/measure.ts
   var Measure = class {
     constructor(sheet2) {
@@ -1204,9 +1328,11 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       const edit = (path, value) => this.page.send({ type: "edit", path, value });
       this.editor = new Editor(byId("parameters"), byId("filter"), edit);
       this.lights = new LightList(edit);
+      this.handles = new LightHandles(this.page, edit);
       this.page.onCamera = () => {
         this.measure.moved();
         this.section.moved();
+        this.handles.draw();
       };
     }
     isStatic;
@@ -1217,6 +1343,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     explanation = new Explanation((errand) => this.page.ticket(errand));
     editor;
     lights;
+    handles;
     tree = new SceneTree(this.page, (shape) => this.select(shape));
     views = new Views(this.page, this.camera);
     measure = new Measure(this.sheet);
@@ -1793,6 +1920,7 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
     byId("drop-edits").disabled = state.settings.length === 0;
     if (!page2.scene) return;
     showCamera(app2, state, page2.scene);
+    app2.handles.take(state.settings);
     showMoment(state, page2.scene);
   }
   function showName({ page: page2, alert }, state) {
@@ -2018,11 +2146,12 @@ Camera "perspective" "float fov" [${+this.fov.toPrecision(9)}]`;
       }
     }
     onScene(scene) {
-      const { page: page2, editor, lights, tree, explanation } = this.app;
+      const { page: page2, editor, lights, handles, tree, explanation } = this.app;
       page2.scene = scene;
       showFacts(byId("facts"), byId("warnings"), scene);
       editor.list(scene.parameters);
       lights.list(scene.parameters);
+      handles.show(scene.parameters);
       tree.list(scene);
       explanation.offer(scene.languages);
       if (page2.state) showState(this.app, page2.state);

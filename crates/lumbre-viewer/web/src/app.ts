@@ -3,6 +3,7 @@ import { Display } from "./display";
 import { Editor } from "./edit";
 import { byId } from "./elements";
 import { Explanation } from "./explanation";
+import { LightHandles } from "./handles";
 import { LightList } from "./lights";
 import { Measure } from "./measure";
 import type { ListedShape } from "./messages";
@@ -20,6 +21,7 @@ export class App {
   readonly explanation = new Explanation((errand) => this.page.ticket(errand));
   readonly editor: Editor;
   readonly lights: LightList;
+  readonly handles: LightHandles;
   readonly tree = new SceneTree(this.page, (shape) => this.select(shape));
   readonly views = new Views(this.page, this.camera);
   readonly measure = new Measure(this.sheet);
@@ -35,9 +37,11 @@ export class App {
     const edit = (path: string, value: string | null) => this.page.send({ type: "edit", path, value });
     this.editor = new Editor(byId("parameters"), byId("filter"), edit);
     this.lights = new LightList(edit);
+    this.handles = new LightHandles(this.page, edit);
     this.page.onCamera = () => {
       this.measure.moved();
       this.section.moved();
+      this.handles.draw();
     };
   }
 

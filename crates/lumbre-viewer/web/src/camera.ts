@@ -68,7 +68,7 @@ export class Camera {
     return this.mirrored ? scale(right, -1) : right;
   }
 
-  private upward(): Vector {
+  upward(): Vector {
     const forward = this.forward();
     return unit(sub(this.placement.up, scale(forward, dot(this.placement.up, forward))));
   }

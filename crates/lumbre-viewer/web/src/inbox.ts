@@ -49,11 +49,12 @@ export class Inbox implements Listener {
   }
 
   private onScene(scene: SceneFacts): void {
-    const { page, editor, lights, tree, explanation } = this.app;
+    const { page, editor, lights, handles, tree, explanation } = this.app;
     page.scene = scene;
     showFacts(byId("facts"), byId("warnings"), scene);
     editor.list(scene.parameters);
     lights.list(scene.parameters);
+    handles.show(scene.parameters);
     tree.list(scene);
     explanation.offer(scene.languages);
     if (page.state) showState(this.app, page.state);

@@ -239,6 +239,11 @@ export interface CameraFacts {
   mirrored: boolean;
   /** The field of view in degrees of a perspective camera. */
   fov: number | null;
+  /**
+   * The part of the image plane that it shows (left, right, bottom, top), in units of half the field of view, if the
+   * file says so.
+   */
+  window: [number, number, number, number] | null;
 }
 
 /** An animation of the file. */

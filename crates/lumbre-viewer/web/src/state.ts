@@ -26,6 +26,7 @@ export function showState(app: App, state: ViewerState): void {
   byId<HTMLButtonElement>("drop-edits").disabled = state.settings.length === 0;
   if (!page.scene) return;
   showCamera(app, state, page.scene);
+  app.handles.take(state.settings);
   showMoment(state, page.scene);
 }
 

@@ -139,6 +139,47 @@ export const habits = ({ view, open, done, pixels, becomes, click, rendered, pro
       await viewer.stop();
     },
 
+    async "lamps are dragged in the picture, by the pointer and by keys"() {
+      const path = write("handles.pbrt", PAIR.replace("[0 -5 5]", "[0 -2 2]"));
+      const viewer = await view(path);
+      const page = await open(viewer.url);
+      await done(page);
+      const handle = page.locator("#handles button");
+      assert.equal(await handle.isVisible(), false, "only while the list is open");
+      await page.click("#light-details > summary");
+      await handle.waitFor();
+      const place = async () => {
+        const [box, sheet] = [await handle.boundingBox(), await page.locator("#sheet").boundingBox()];
+        const middle = (b) => [b.x + b.width / 2, b.y + b.height / 2];
+        const [x, y] = middle(box);
+        return { x, y, share: [(x - sheet.x) / sheet.width, (y - sheet.y) / sheet.height] };
+      };
+      // What the camera of the file has there: along (0, 6, 1), by the slope of its field of view.
+      const [eye, lamp, forward, up] = [[0, -8, 1], [0, -2, 2], [0, 8, -1], [0, 1, 8]].map((v, i) => (i < 2 ? v : v.map((x) => x / Math.hypot(...v))));
+      const way = lamp.map((x, i) => x - eye[i]);
+      const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
+      const height = dot(way, up) / dot(way, forward) / Math.tan((17.5 * Math.PI) / 180);
+      const start = await place();
+      near(start.share, [0.5, 0.5 - 0.5 * height], 2e-3);
+      await changed(page, async () => {
+        await page.mouse.move(start.x, start.y);
+        await page.mouse.down();
+        await page.mouse.move(start.x + 30, start.y + 20, { steps: 3 });
+        await page.mouse.up();
+      });
+      const after = await place();
+      near([after.x, after.y], [start.x + 30, start.y + 20], 1.5);
+      await page.waitForFunction(() => document.getElementById("light-options").value !== "");
+      await handle.focus();
+      await changed(page, () => page.keyboard.press("PageUp"));
+      await page.waitForTimeout(300);
+      const options = await page.inputValue("#light-options");
+      assert.match(options, /^-D '?light\.1\.from=/);
+      await becomes(page, rendered(path, "-D", options.slice(3).replaceAll("'", "")), true);
+      assert.equal(readFileSync(path, "utf8"), PAIR.replace("[0 -5 5]", "[0 -2 2]"));
+      await viewer.stop();
+    },
+
     async "standard views look from the sides of the scene, and views are kept"() {
       const viewer = await view(write("views.pbrt", PAIR));
       const page = await open(viewer.url);
