@@ -38,7 +38,10 @@ pub(crate) fn test() -> Result<()> {
         compiler.args(["-shared", "-o"]).arg(&library).arg(root().join("xtask/src/wine/bcryptprimitives.c"));
         run_command(compiler.arg("-ladvapi32"))?;
     }
-    cargo.envs(environment).env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUNNER", "wine").arg("--release");
+    cargo
+        .envs(environment)
+        .env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUNNER", "wine")
+        .args(["--profile", "trial"]);
     cargo.args(PACKAGES.iter().flat_map(|name| ["--package", name]));
     run_command(&mut cargo)
 }

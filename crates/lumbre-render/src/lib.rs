@@ -12,23 +12,25 @@
 //!
 //! | stage | file | what it does |
 //! |---|---|---|
-//! | generate | `one_sample.rs`, `wave/primary_hits.rs` | a camera ray for each sample, and what it hits |
+//! | generate | `one_sample.rs`, `wave/primary_hits.rs`, `wave/camera.rs` | a camera ray for each sample, and what it hits |
 //! | catch | `wave/catcher.rs` | camera rays that hit a shadow catcher: samples of its lights, and whether they are blocked |
 //! | search | `wave/search.rs` | the closest hits of all rays, by the kernel; rays that pass through cut-outs are traced again in f64 |
 //! | media | `wave/media.rs` | absorption, emission and scattering between surfaces |
 //! | escape | `wave/escape.rs` | light at infinity, for rays that leave the scene |
-//! | surfaces | `wave/surfaces.rs`, `wave/flat.rs`, `wave/smooth.rs` | vertices: point, error bound, normal, frame, BSDF row, emission |
+//! | surfaces | `wave/surfaces.rs`, `wave/flat.rs`, `wave/smooth.rs`, `wave/placed.rs` | vertices: point, error bound, normal, frame, BSDF row, emission |
 //! | merge | `wave/merge.rs`, `caustics/` | photons near the vertices, by the integrator `caustics` |
 //! | shade | `wave/shade.rs` | per kind of BSDF, in lanes: a light sample becomes a shadow segment, a BSDF sample the next ray |
+//! | cross | `wave/mod.rs` | the solids and media that the next rays enter |
 //! | shadows | `wave/shadows.rs` | how much of each light sample arrives: any hit, media, panes |
+//! | segments | `wave/mod.rs` | rays that start on the smooth surface over a face: whether that is free up to there |
 //!
 //! `whitted` and `ambientocclusion` shade one vertex at a time and follow several rays from it (`wave/trees.rs`).
 //!
 //! All stages share `wave/setting.rs`. Triangles with uniform materials run in lanes, from the plain rows of
-//! `Scene::tables`. Textured materials are looked up one by one. Exact shapes, instances, solids and bump maps go one
-//! by one through `Scene::interaction`. Shading is written once over `R: Real` (`lumbre-simd`): one number, eight
-//! (AVX2) or sixteen (AVX-512), with the same bits. `InstructionSet::detect` chooses when a render begins; the
-//! environment variable `LUMBRE_SIMD` limits it.
+//! `Scene::tables`. Textured materials are looked up one by one. Exact shapes, solids, bump maps of heights, and
+//! instances that move or are nested go one by one through `Hits::interaction`. Shading is written once over `R: Real`
+//! (`lumbre-simd`): one number, four (NEON, WebAssembly), eight (AVX2) or sixteen (AVX-512), with the same bits.
+//! `InstructionSet::detect` chooses when a render begins; the environment variable `LUMBRE_SIMD` limits it.
 //!
 //! Light paths of `caustics` begin on specular surfaces (`caustics/light_paths.rs`). Their photons are in a k-d tree
 //! for four samples of each pixel and are weighed against what camera paths find (`caustics/merging.rs`).

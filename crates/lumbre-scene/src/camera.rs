@@ -235,8 +235,8 @@ impl Camera {
         }
     }
 
-    /// The part of the image plane that the picture shows, whatever its size: x0, x1, y0, y1, in units of half the field
-    /// of view, or for an orthographic camera in those of the world; `None` if that follows from the size.
+    /// The part of the image plane that the picture shows, whatever its size: x0, x1, y0, y1, in units of half the
+    /// field of view, or for an orthographic camera in those of the world; `None` if that follows from the size.
     pub fn window(&self) -> Option<[f64; 4]> {
         self.screen_window.or_else(|| self.frame_aspect.map(window))
     }

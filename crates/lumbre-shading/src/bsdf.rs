@@ -102,11 +102,6 @@ impl Bsdf {
         }
     }
 
-    /// Whether [`Bsdf::sample`] reads `lobe`.
-    pub fn has_lobes(&self) -> bool {
-        !matches!(self, Self::Diffuse(_) | Self::Conductor(_) | Self::Measured(_))
-    }
-
     /// Whether all parts are deltas, so that light sampling is useless.
     pub fn is_delta(&self) -> bool {
         match self {

@@ -731,7 +731,7 @@ mod tests {
         set(&mut desc, "film.exposure=2").unwrap();
         let mut spot = desc.clone();
         spot.lights[0] = LightDesc::Spot {
-            world_from_light: Transform::look_at_left(DVec3::ONE, DVec3::ZERO, DVec3::Z).unwrap(),
+            world_from_light: Transform::translate(DVec3::ONE) * Transform::rotate(DVec3::Y, 30.0).unwrap(),
             intensity: Rgb::splat(1.0),
             cone_angle: 30.0,
             cone_delta_angle: 5.0,

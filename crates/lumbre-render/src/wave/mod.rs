@@ -1,10 +1,8 @@
 //! Waves of paths: data in columns, and stages that advance all paths by one step.
 //!
 //! A wave holds a few thousand samples ([`Slots`]), each with its path ([`Paths`]), which starts at the camera
-//! ([`camera`]). A bounce goes through these stages: the closest hits of all rays ([`search`]); the media on the way
-//! ([`media`]); the surfaces that were hit, as columns, with emission and materials ([`surfaces`]); a light sample and
-//! a new direction for each path ([`shade`]); and the visibility of the light samples ([`shadows`]). A path depends
-//! only on its sample: neither the size of the wave nor the other paths change the picture.
+//! ([`camera`]). `Wave::follow` takes each bounce through its stages; the crate's page lists them. A path depends only
+//! on its sample: neither the size of the wave nor the other paths change the picture.
 
 mod camera;
 pub(crate) mod catcher;

@@ -167,7 +167,7 @@
     }
     take(settings) {
       this.settings = new Map(settings);
-      const own = settings.filter(([path]) => this.lights.some((light) => light.path === path));
+      const own = settings.filter(([path]) => path.startsWith("light.") || this.lights.some((light) => light.path === path));
       const text = byId("light-options");
       text.value = asOptions(own);
       text.hidden = own.length === 0;

@@ -38,7 +38,7 @@ export class LightList {
 
   take(settings: [string, string][]): void {
     this.settings = new Map(settings);
-    const own = settings.filter(([path]) => this.lights.some((light) => light.path === path));
+    const own = settings.filter(([path]) => path.startsWith("light.") || this.lights.some((light) => light.path === path));
     const text = byId<HTMLTextAreaElement>("light-options");
     text.value = asOptions(own);
     text.hidden = own.length === 0;
