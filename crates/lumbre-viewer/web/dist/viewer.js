@@ -435,12 +435,14 @@
     layer = byId("handles");
     list = byId("light-details");
     handles = [];
+    /** The handle under the pointer, and where that was last. */
     held = null;
     isWaiting = false;
     /** The lights of a scene. */
     show(parameters) {
       const places = parameters.filter(({ path, kind }) => kind === "point" && path.startsWith("light."));
-      const isSame = places.length === this.handles.length && places.every(({ path }, i) => this.handles[i]?.path === path);
+      const known = (handle, { path, owner }) => handle?.path === path && handle.owner === owner;
+      const isSame = places.length === this.handles.length && places.every((place, i) => known(this.handles[i], place));
       if (!isSame) {
         this.handles = places.map((place) => this.handle(place));
         this.layer.replaceChildren(...this.handles.map(({ button }) => button));
@@ -456,7 +458,7 @@
       const edits = new Map(settings);
       for (const handle of this.handles) {
         const set = edits.get(handle.path);
-        if (handle !== this.held) handle.at = set === void 0 ? handle.start : vector(set.split(",").map(Number));
+        if (handle !== this.held?.handle) handle.at = set === void 0 ? handle.start : vector(set.split(",").map(Number));
       }
       this.draw();
     }
@@ -494,16 +496,17 @@
       const button = element("button", "", { className: "handle", title: `${owner}: drag it; with Shift, nearer and farther` });
       button.setAttribute("aria-label", `Move ${owner}: arrow keys, Page Up and Page Down`);
       const at = vector(value ?? [0, 0, 0]);
-      const handle = { path, start: at, at, button };
+      const handle = { path, owner, start: at, at, button };
       button.addEventListener("pointerdown", (event) => {
         button.setPointerCapture(event.pointerId);
-        this.held = handle;
+        this.held = { handle, x: event.clientX, y: event.clientY };
       });
       button.addEventListener("pointermove", (event) => {
-        if (this.held !== handle) return;
+        if (this.held?.handle !== handle) return;
         const { sheet: sheet2 } = this.page;
         const pixel = 2 * this.slope() / (Math.min(sheet2.width, sheet2.height) * sheet2.scale());
-        const [x, y] = [event.movementX * pixel, -event.movementY * pixel];
+        const [x, y] = [(event.clientX - this.held.x) * pixel, (this.held.y - event.clientY) * pixel];
+        this.held = { handle, x: event.clientX, y: event.clientY };
         this.move(handle, event.shiftKey ? [0, 0, y] : [x, y, 0]);
       });
       for (const end of ["pointerup", "pointercancel"]) {

@@ -11,13 +11,14 @@ const KEYS: Record<string, Vector> = {
 };
 
 /** A light: where it stands, and what moves it. */
-interface Handle { path: string; start: Vector; at: Vector; button: HTMLButtonElement }
+interface Handle { path: string; owner: string; start: Vector; at: Vector; button: HTMLButtonElement }
 
 export class LightHandles {
   private readonly layer = byId("handles");
   private readonly list = byId<HTMLDetailsElement>("light-details");
   private handles: Handle[] = [];
-  private held: Handle | null = null;
+  /** The handle under the pointer, and where that was last. */
+  private held: { handle: Handle; x: number; y: number } | null = null;
   private isWaiting = false;
 
   constructor(private readonly page: Page, private readonly edit: (path: string, value: string) => void) {
@@ -27,7 +28,8 @@ export class LightHandles {
   /** The lights of a scene. */
   show(parameters: ListedParameter[]): void {
     const places = parameters.filter(({ path, kind }) => kind === "point" && path.startsWith("light."));
-    const isSame = places.length === this.handles.length && places.every(({ path }, i) => this.handles[i]?.path === path);
+    const known = (handle: Handle | undefined, { path, owner }: ListedParameter) => handle?.path === path && handle.owner === owner;
+    const isSame = places.length === this.handles.length && places.every((place, i) => known(this.handles[i], place));
     if (!isSame) {
       this.handles = places.map((place) => this.handle(place));
       this.layer.replaceChildren(...this.handles.map(({ button }) => button));
@@ -44,7 +46,7 @@ export class LightHandles {
     const edits = new Map(settings);
     for (const handle of this.handles) {
       const set = edits.get(handle.path);
-      if (handle !== this.held) handle.at = set === undefined ? handle.start : vector(set.split(",").map(Number));
+      if (handle !== this.held?.handle) handle.at = set === undefined ? handle.start : vector(set.split(",").map(Number));
     }
     this.draw();
   }
@@ -86,17 +88,18 @@ export class LightHandles {
     const button = element("button", "", { className: "handle", title: `${owner}: drag it; with Shift, nearer and farther` });
     button.setAttribute("aria-label", `Move ${owner}: arrow keys, Page Up and Page Down`);
     const at = vector(value ?? [0, 0, 0]);
-    const handle: Handle = { path, start: at, at, button };
+    const handle: Handle = { path, owner, start: at, at, button };
     button.addEventListener("pointerdown", (event) => {
       button.setPointerCapture(event.pointerId);
-      this.held = handle;
+      this.held = { handle, x: event.clientX, y: event.clientY };
     });
     button.addEventListener("pointermove", (event) => {
-      if (this.held !== handle) return;
+      if (this.held?.handle !== handle) return;
       const { sheet } = this.page;
       // Across the picture at the depth of the light, as far as the pointer goes.
       const pixel = (2 * this.slope()) / (Math.min(sheet.width, sheet.height) * sheet.scale());
-      const [x, y] = [event.movementX * pixel, -event.movementY * pixel];
+      const [x, y] = [(event.clientX - this.held.x) * pixel, (this.held.y - event.clientY) * pixel];
+      this.held = { handle, x: event.clientX, y: event.clientY };
       this.move(handle, event.shiftKey ? [0, 0, y] : [x, y, 0]);
     });
     for (const end of ["pointerup", "pointercancel"] as const) {
