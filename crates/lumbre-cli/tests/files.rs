@@ -51,7 +51,7 @@ pub(crate) fn answer(output: Output) -> (i32, String) {
     #[cfg(unix)]
     let signal = std::os::unix::process::ExitStatusExt::signal(&output.status);
     #[cfg(not(unix))]
-    let signal = None;
+    let signal: Option<i32> = None;
     // A signal that comes before it listens ends it as it ends any program.
     (output.status.code().or(signal.map(|signal| 128 + signal)).unwrap(), said)
 }
