@@ -4,7 +4,7 @@
 
 use std::fs;
 use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 
 use tempfile::TempDir;
@@ -230,7 +230,7 @@ fn an_interrupted_stream_leaves_no_file() {
         let mut child = desk.spawn(&["--rays", "-", "-o", "out.npz"]);
         let mut rays = child.stdin.take().unwrap();
         rays.write_all(csv.as_bytes()).unwrap();
-        let is_writing = |path: &Path| {
+        let is_writing = |path: &std::path::Path| {
             fs::read_dir(path)
                 .unwrap()
                 .any(|entry| entry.unwrap().file_name().to_string_lossy().ends_with(".part"))
