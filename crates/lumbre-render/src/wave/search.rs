@@ -33,6 +33,23 @@ pub(crate) struct MetTriangle {
     pub(crate) local: [f32; 2],
 }
 
+impl MetTriangle {
+    /// That of a hit in the columns.
+    #[inline]
+    fn in_column(columns: &HitColumns, column: usize) -> Self {
+        Self {
+            id: columns.id[column],
+            triangle: columns.primitive[column],
+            local: columns.local.each_ref().map(|local| local[column]),
+        }
+    }
+
+    /// That of a whole hit.
+    fn of(hit: &Hit) -> Self {
+        Self { id: hit.id, triangle: hit.primitive, local: hit.root.local.as_vec2().to_array() }
+    }
+}
+
 /// The precision of a wave's rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Precision {
@@ -171,16 +188,9 @@ impl Hits {
     pub(crate) fn triangle(&self, path: usize) -> Option<MetTriangle> {
         let column = self.column(path);
         if self.is_single && self.hit_behind(column).is_none() {
-            let columns = &self.columns;
-            return columns.is_plain(column).then(|| MetTriangle {
-                id: columns.id[column],
-                triangle: columns.primitive[column],
-                local: [columns.local[0][column], columns.local[1][column]],
-            });
+            return self.columns.is_plain(column).then(|| MetTriangle::in_column(&self.columns, column));
         }
-        let hit = self.hit(path).filter(|hit| hit.instances.is_empty())?;
-        let local = hit.root.local.as_vec2().to_array();
-        Some(MetTriangle { id: hit.id, triangle: hit.primitive, local })
+        self.hit(path).filter(|hit| hit.instances.is_empty()).map(|hit| MetTriangle::of(&hit))
     }
 
     /// The triangle that a ray met in a top-level instance, and the position of that in the tree.
@@ -188,17 +198,11 @@ impl Hits {
     pub(crate) fn triangle_in_instance(&self, path: usize) -> Option<(MetTriangle, u32)> {
         let column = self.column(path);
         if self.is_single && self.hit_behind(column).is_none() {
-            let columns = &self.columns;
-            let met = MetTriangle {
-                id: columns.id[column],
-                triangle: columns.primitive[column],
-                local: [columns.local[0][column], columns.local[1][column]],
-            };
-            return Some((met, columns.only_instance(column)?));
+            let instance = self.columns.only_instance(column)?;
+            return Some((MetTriangle::in_column(&self.columns, column), instance));
         }
         let hit = self.hit(path)?;
-        let local = hit.root.local.as_vec2().to_array();
-        Some((MetTriangle { id: hit.id, triangle: hit.primitive, local }, hit.only_instance()?))
+        Some((MetTriangle::of(&hit), hit.only_instance()?))
     }
 
     /// The length of a ray up to its hit.
